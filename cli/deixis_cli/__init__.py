@@ -1,0 +1,1 @@
+"""The deixis command"""

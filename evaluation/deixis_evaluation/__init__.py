@@ -1,0 +1,1 @@
+"""Scores Deixis on labelled clips"""

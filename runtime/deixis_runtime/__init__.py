@@ -1,0 +1,1 @@
+"""What every Deixis stage runs on: session, loop, health, configuration, supervisor"""

@@ -1,0 +1,417 @@
+"""The messages of Deixis: plain data, one class per type on the wire.
+
+Units stand in the field names. Bearings and yaw are measured at the person, from the direction person -> camera, positive
+toward the image's right, that is toward the person's own left (REP-103: counter-clockwise seen from above). Map,
+`base_link` and optical frames follow REP-103 and REP-105. Pixel coordinates have their origin at the centre of the top
+left pixel, x right, y down. Times are Unix nanoseconds at the camera's host.
+
+A reader ignores fields it does not know; a field that changes its meaning raises the type's `VERSION`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+MAX_SIDE_PX = 8192
+MAX_PERSONS = 32
+MAX_TRACKS = 96
+MAX_POIS = 1024
+MAX_CONTOUR_BYTES = 65536
+
+Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.\-]+$")]
+Text = Annotated[str, Field(max_length=2000)]
+Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Share = Annotated[float, Field(ge=-1e-9, le=1 + 1e-9)]
+Pixel = Annotated[float, Field(ge=-4 * MAX_SIDE_PX, le=4 * MAX_SIDE_PX)]
+Metre = Annotated[float, Field(ge=-1e5, le=1e5)]
+Degree = Annotated[float, Field(ge=-360, le=360)]
+Point = tuple[Pixel, Pixel]
+Position = tuple[Metre, Metre, Metre]
+
+TrackKind = Literal["face", "left_hand", "right_hand", "unknown"]
+PoseStatus = Literal["tracking", "out_of_range", "initialising", "lost"]
+Phase = Literal["idle", "preparation", "stroke", "retraction"]
+GestureKind = Literal["point_left", "point_right", "invisible", "other", "none"]
+Side = Literal["left", "right"]
+FrameEncoding = Literal["bgr8", "mono8", "jpeg"]
+CameraState = Literal["starting", "streaming", "retrying", "ended", "failed"]
+SourceStatus = Literal["ok", "late", "dead", "wrong_version", "not_tracking"]
+HealthState = Literal["ok", "degraded", "failed"]
+
+
+class Producer(NamedTuple):
+    """Who made a message: the stage and the one process of it."""
+
+    stage: str
+    instance: str
+
+
+class Part(BaseModel):
+    """A piece of a message; has no version of its own."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, ser_json_bytes="base64", val_json_bytes="base64")
+
+
+class Message(Part):
+    """What travels under a key of its own."""
+
+    VERSION: ClassVar[int] = 1
+
+
+class Produced(Message):
+    """A message that names its producer and the time it speaks of."""
+
+    stamp_ns: Nanoseconds = Field(description="Time the content speaks of: capture time of the frame where there is one.")
+    stage: Name = Field(description="Stage that made the message.")
+    instance: Name = Field(description="Process of that stage; a new one after each restart.")
+
+
+class OfFrame(Produced):
+    """A message about one frame. Frames are told apart by `seq` and `stamp_ns` together, for a restarted camera counts anew."""
+
+    seq: Count = Field(description="Number of the frame; of a file, its index from 0.")
+
+    @classmethod
+    def derive(cls, source: OfFrame, producer: Producer, **content: object) -> Self:
+        """Build the message that `producer` derives from `source`: repeats its `seq` and `stamp_ns`, names the producer.
+
+        Raises pydantic.ValidationError where the content breaks the contract.
+        """
+        return cls.model_validate(
+            {**content, "seq": source.seq, "stamp_ns": source.stamp_ns, "stage": producer.stage, "instance": producer.instance}
+        )
+
+    @property
+    def frame_id(self) -> tuple[int, int]:
+        """(seq, stamp_ns): equal for all messages about one frame."""
+        return self.seq, self.stamp_ns
+
+
+# --- camera -----------------------------------------------------------------------------------------------------------
+
+
+class Frame(OfFrame):
+    """One picture. `bgr8` and `mono8` are rows of bytes without padding, `jpeg` is a JPEG file."""
+
+    width: int = Field(ge=1, le=MAX_SIDE_PX)
+    height: int = Field(ge=1, le=MAX_SIDE_PX)
+    encoding: FrameEncoding
+    data: bytes = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _data_fits_size(self) -> Self:
+        channels = {"bgr8": 3, "mono8": 1}.get(self.encoding)
+        if channels and len(self.data) != self.width * self.height * channels:
+            raise ValueError(
+                f"data: {len(self.data)} bytes, but {self.width} x {self.height} {self.encoding} has "
+                f"{self.width * self.height * channels}"
+            )
+        return self
+
+
+class CameraMount(Part):
+    """Pose of the optical centre in `base_link` (REP-103: x forward, y left, z up)."""
+
+    position_m: Position = Field(default=(0.0, 0.0, 1.3), description="Optical centre in base_link, metres.")
+    yaw_deg: Degree = Field(default=0.0, description="Turn of the optical axis to the robot's left, degrees.")
+    pitch_up_deg: Degree = Field(default=0.0, description="Tilt of the optical axis above the horizontal, degrees.")
+
+
+class CameraInfo(Produced):
+    """What the camera is, how it projects, and whether it delivers."""
+
+    state: CameraState
+    reason: Text = Field(default="", description="Why it is not streaming, as one sentence.")
+    source: Text = Field(description="Device, file or URL, without credentials.")
+    width: int = Field(default=0, ge=0, le=MAX_SIDE_PX)
+    height: int = Field(default=0, ge=0, le=MAX_SIDE_PX)
+    rate_hz: float = Field(default=0.0, ge=0, le=1000, description="Nominal rate of the source; 0 where it is unknown.")
+    camera_matrix: tuple[float, float, float, float, float, float, float, float, float] | None = Field(
+        default=None, description="K, row-major, for `width` x `height`; none before the first picture."
+    )
+    distortion_model: Literal["none", "plumb_bob", "rational_polynomial", "equidistant"] = "none"
+    distortion: list[float] = Field(default_factory=list, max_length=14)
+    intrinsics: Text = Field(default="", description="Where camera_matrix comes from, e.g. an assumed field of view.")
+    mount: CameraMount = Field(default_factory=CameraMount)
+    lockstep: bool = Field(default=False, description="The next frame waits for fusion's answer; stamps are media time.")
+    last_seq: int = Field(default=-1, ge=-1, le=2**63 - 1, description="Last frame published; of use when `ended`.")
+
+
+# --- tracker ----------------------------------------------------------------------------------------------------------
+
+
+class KindProbabilities(Part):
+    """Belief of the classifier over the kinds; sums to 1."""
+
+    face: Share = 0.0
+    left_hand: Share = 0.0
+    right_hand: Share = 0.0
+    unknown: Share = 0.0
+
+
+class Track(Part):
+    """One tracked skin-coloured blob. Left and right are the person's own."""
+
+    track_id: Count
+    person_id: int | None = Field(default=None, ge=0, description="Person it belongs to; none where that is open.")
+    kind: TrackKind
+    kind_probabilities: KindProbabilities
+    centroid_px: Point
+    bbox_px: tuple[Pixel, Pixel, Annotated[float, Field(ge=0, le=MAX_SIDE_PX)], Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]] = (
+        Field(description="x, y of the top left corner, width, height. Of a face: the face itself, chin to brow, ear to ear.")
+    )
+    velocity_px_s: tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)]]
+    contour: bytes = Field(
+        default=b"", max_length=MAX_CONTOUR_BYTES, description="Outline as packed little-endian int16 pairs x, y; empty if unseen."
+    )
+    observed: bool = Field(default=True, description="Seen in this frame; false while it is only predicted.")
+    confidence: Share = Field(default=1.0, description="Belief that the blob is what its kind says.")
+
+    @model_validator(mode="after")
+    def _contour_is_pairs(self) -> Self:
+        if len(self.contour) % 4:
+            raise ValueError("contour: not a whole number of int16 pairs")
+        return self
+
+
+class Tracks(OfFrame):
+    """All tracks of one frame."""
+
+    width: int = Field(ge=1, le=MAX_SIDE_PX, description="Width of the frame the pixels refer to.")
+    height: int = Field(ge=1, le=MAX_SIDE_PX)
+    tracks: list[Track] = Field(default_factory=list, max_length=MAX_TRACKS)
+
+
+# --- headpose ---------------------------------------------------------------------------------------------------------
+
+
+class HeadPose(Part):
+    """Head of one person. `yaw_deg` is none unless `status` is `tracking`; for `out_of_range` its sign may be known."""
+
+    person_id: Count
+    status: PoseStatus
+    yaw_deg: Degree | None = None
+    yaw_sigma_deg: Annotated[float, Field(gt=0, le=180)] | None = None
+    pitch_deg: Degree | None = None
+    roll_deg: Degree | None = None
+    side: Side | None = Field(default=None, description="Side the head is turned to where out of range: the person's own.")
+
+    @model_validator(mode="after")
+    def _tracking_has_yaw(self) -> Self:
+        if self.status == "tracking" and (self.yaw_deg is None or self.yaw_sigma_deg is None):
+            raise ValueError("yaw_deg: a pose with status 'tracking' needs yaw_deg and yaw_sigma_deg")
+        return self
+
+
+class HeadPoses(OfFrame):
+    """Heads of one frame."""
+
+    poses: list[HeadPose] = Field(default_factory=list, max_length=MAX_PERSONS)
+
+
+# --- gesture ----------------------------------------------------------------------------------------------------------
+
+
+class Gesture(Part):
+    """What the gesturing hand of one person does."""
+
+    person_id: Count
+    phase: Phase
+    gesture: GestureKind
+    hand: Side | None = Field(default=None, description="The hand spoken of, the person's own; none while idle.")
+    fingertips_px: list[Point] = Field(default_factory=list, max_length=10)
+    bearing_deg: Degree | None = Field(default=None, description="Direction pointed to, where the stage can tell.")
+    bearing_sigma_deg: Annotated[float, Field(gt=0, le=180)] | None = None
+    bearing_mirrored: bool = Field(
+        default=False, description="The stage cannot tell bearing b from 180 - b (in front of the person or behind)."
+    )
+
+    @model_validator(mode="after")
+    def _bearing_has_sigma(self) -> Self:
+        if (self.bearing_deg is None) != (self.bearing_sigma_deg is None):
+            raise ValueError("bearing_sigma_deg: bearing_deg and bearing_sigma_deg come together")
+        return self
+
+
+class Gestures(OfFrame):
+    """Gestures of one frame."""
+
+    gestures: list[Gesture] = Field(default_factory=list, max_length=MAX_PERSONS)
+
+
+# --- fusion -----------------------------------------------------------------------------------------------------------
+
+
+class Poi(Message):
+    """A point of interest in the map frame."""
+
+    poi_id: Name = Field(description="Equals the last part of its key.")
+    name: Text = Field(default="", description="For people; the id where it is empty.")
+    position_m: Position = Field(description="Centre in the map frame, x, y, z, metres.")
+    extent_m: float = Field(default=0.5, ge=0, le=1000, description="Size across, metres.")
+    tags: list[Annotated[str, Field(max_length=64)]] = Field(default_factory=list, max_length=32)
+
+
+class PoiBelief(Part):
+    """Standing of one POI in a combined belief."""
+
+    poi_id: Name
+    mass: Share = Field(description="Mass of the set that holds it alone.")
+    belief: Share
+    plausibility: Share
+    pignistic: Share
+    bearing_deg: Degree | None = Field(default=None, description="Its bearing at the person.")
+
+
+class FocalSet(Part):
+    """A set of POIs with its mass."""
+
+    poi_ids: list[Name] = Field(max_length=MAX_POIS)
+    mass: Share
+
+
+class Evidence(Part):
+    """What one source contributed."""
+
+    source: Name = Field(description="`gesture` or `headpose`.")
+    producer: Text = Field(default="", description="`stage/instance` that made it; empty if there was none.")
+    status: SourceStatus
+    observed: Text = Field(description="What was observed, e.g. 'point_left' or 'yaw -61.9 +- 3.1 deg'; why nothing was.")
+    age_ms: float | None = Field(default=None, ge=0, description="Age of the observation when it was used.")
+    weight: Share = Field(description="1 - m(X): 0 for a vacuous assignment.")
+    masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_POIS)
+
+
+class PersonBelief(Part):
+    """Belief about one person."""
+
+    person_id: Count
+    position_m: Position | None = Field(default=None, description="Person's head in the map frame; none where unknown.")
+    distance_m: float | None = Field(default=None, ge=0)
+    pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS, description="The frame of discernment.")
+    unknown: Share = Field(default=1.0, description="Mass of the whole frame of discernment: what is not known.")
+    conflict: Share = 0.0
+    evidence: list[Evidence] = Field(default_factory=list, max_length=8)
+    episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
+
+
+class Belief(OfFrame):
+    """Fusion's answer to one frame."""
+
+    persons: list[PersonBelief] = Field(default_factory=list, max_length=MAX_PERSONS)
+    missing: list[Name] = Field(default_factory=list, max_length=8, description="Stages that did not answer for this frame.")
+
+
+class Target(OfFrame):
+    """The POI that a person points at: updates of one episode, the last with `final: true`."""
+
+    episode_id: Text
+    person_id: Count
+    final: bool
+    poi_ids: list[Name] = Field(max_length=MAX_POIS, description="The answer: one, several when tied, none on abstention.")
+    pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS)
+    conflict: Share
+    evidence: list[Evidence] = Field(default_factory=list, max_length=8)
+    reason: Text
+    started_ns: Nanoseconds
+    ended_ns: Nanoseconds
+    latency_ms: float = Field(ge=0, description="Capture of the last frame used to publication; 0 in lockstep.")
+
+
+class RobotPose(Produced):
+    """Pose of `base_link` in the map frame."""
+
+    x_m: Metre
+    y_m: Metre
+    yaw_deg: Degree = Field(description="Counter-clockwise from the map's x axis.")
+
+
+class SourceState(Part):
+    """How fusion sees one stage it listens to."""
+
+    stage: Name
+    status: SourceStatus
+    producers: list[Text] = Field(default_factory=list, max_length=8, description="Processes heard lately as `stage/instance`.")
+    age_s: float | None = Field(default=None, ge=0, description="Since the last accepted message; none if there was none.")
+    received: Count = 0
+    rejected: Count = 0
+    reason: Text = ""
+
+
+class RejectedEdit(Part):
+    """A registry edit that was refused."""
+
+    key: Text
+    reason: Text = Field(description="Names the field.")
+    stamp_ns: Nanoseconds
+
+
+class State(Produced):
+    """Everything fusion knows, answered to a get."""
+
+    robot: Name
+    sources: list[SourceState] = Field(max_length=16)
+    robot_pose: RobotPose | None = None
+    pois: list[Poi] = Field(max_length=MAX_POIS)
+    persons: list[PersonBelief] = Field(max_length=MAX_PERSONS)
+    last_seq: int = Field(default=-1, ge=-1, le=2**63 - 1, description="Last frame answered.")
+    open_episodes: list[Text] = Field(default_factory=list, max_length=MAX_PERSONS)
+    recent_targets: list[Target] = Field(default_factory=list, max_length=16, description="Final answers, newest last.")
+    registry_path: Text = ""
+    edits_accepted: Count = 0
+    edits_rejected: Count = 0
+    rejected_edits: list[RejectedEdit] = Field(default_factory=list, max_length=16, description="Newest last.")
+
+
+# --- every stage ------------------------------------------------------------------------------------------------------
+
+
+class InputHealth(Part):
+    """One key that a stage listens to."""
+
+    key: Text
+    received: Count = 0
+    used: Count = 0
+    overwritten: Count = Field(default=0, description="Replaced by a newer one before the stage came to it.")
+    too_old: Count = 0
+    rejected: Count = Field(default=0, description="Wrong encoding, version or content.")
+    last_error: Text = ""
+    age_s: float | None = Field(default=None, ge=0, description="Since the last one received.")
+    rate_hz: float = Field(default=0.0, ge=0)
+    producers: list[Text] = Field(default_factory=list, max_length=8)
+
+
+class OutputHealth(Part):
+    """One key that a stage publishes."""
+
+    key: Text
+    published: Count = 0
+    rate_hz: float = Field(default=0.0, ge=0)
+
+
+class Health(Produced):
+    """Heartbeat of a stage. `count` advances only while its loop runs."""
+
+    count: Count
+    state: HealthState
+    reason: Text = Field(default="", description="Why it is not ok, as one sentence.")
+    pid: Count
+    host: Text
+    uptime_s: float = Field(ge=0)
+    cpu_s: float = Field(ge=0, description="Processor time used since the start, user and system.")
+    rss_mb: float = Field(ge=0)
+    step_ms_p50: float = Field(default=0.0, ge=0, description="Time of one step over the last second.")
+    step_ms_max: float = Field(default=0.0, ge=0)
+    inputs: list[InputHealth] = Field(default_factory=list, max_length=16)
+    outputs: list[OutputHealth] = Field(default_factory=list, max_length=16)
+    counters: dict[str, Count] = Field(default_factory=dict, max_length=64, description="Counters of the stage's own.")
+    notes: list[Text] = Field(default_factory=list, max_length=16, description="Conditions worth saying, e.g. assumed intrinsics.")
+
+
+TYPES: dict[str, type[Message]] = {
+    cls.__name__: cls
+    for cls in (Frame, CameraInfo, Tracks, HeadPoses, Gestures, Belief, Target, State, Poi, RobotPose, Health)
+}

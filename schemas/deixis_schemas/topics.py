@@ -1,0 +1,89 @@
+"""The topic table: every key of Deixis with its type, rate and delivery. All else (publishers, health, recorder, docs,
+conformance) is derived from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from . import messages as m
+
+STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
+
+
+class Delivery(Enum):
+    """How a topic is delivered, named for its stance; the runtime gives each its Zenoh settings."""
+
+    BULK_NEWEST = "bulk, newest wins: frames; dropped first when the link is full"
+    NEWEST = "newest wins: small and perishable; dropped when late"
+    KEEP = "keep: few, and the last one is answered to a get"
+    KEEP_URGENT = "keep, high priority: answers that people wait for"
+    REPLY = "reply: answered to a get only"
+
+
+class By(Enum):
+    """When a topic is published."""
+
+    FRAME = "each frame"
+    CHANGE = "on change"
+    EPISODE = "each update of a pointing episode"
+    RATE = "at its rate"
+    GET = "by get only"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One row of the table. `path` follows `deixis/{robot}/`; `{stage}` and `{id}` in it are filled in by `key`."""
+
+    path: str
+    type: type[m.Message]
+    by: By
+    rate_hz: float | None
+    delivery: Delivery
+    queryable: bool = False
+    max_bytes: int = 1 << 20
+
+    @property
+    def version(self) -> int:
+        """Version of the payload."""
+        return self.type.VERSION
+
+    def key(self, robot: str, **parts: str) -> str:
+        """Key expression of the topic for one robot, e.g. `FRAME.key('r1')` or `HEALTH.key('r1', stage='*')`."""
+        return f"deixis/{robot}/{self.path.format(**parts)}"
+
+
+FRAME = Topic("camera/frame", m.Frame, By.FRAME, 30.0, Delivery.BULK_NEWEST, max_bytes=128 << 20)
+CAMERA_INFO = Topic("camera/info", m.CameraInfo, By.CHANGE, None, Delivery.KEEP, queryable=True)
+TRACKS = Topic("tracker/tracks", m.Tracks, By.FRAME, 30.0, Delivery.NEWEST)
+HEAD_POSES = Topic("headpose/poses", m.HeadPoses, By.FRAME, 30.0, Delivery.NEWEST)
+GESTURES = Topic("gesture/gestures", m.Gestures, By.FRAME, 30.0, Delivery.NEWEST)
+BELIEF = Topic("fusion/belief", m.Belief, By.FRAME, 30.0, Delivery.NEWEST)
+TARGET = Topic("fusion/target", m.Target, By.EPISODE, None, Delivery.KEEP_URGENT)
+STATE = Topic("fusion/state", m.State, By.GET, None, Delivery.REPLY, queryable=True)
+POI = Topic("fusion/poi/{id}", m.Poi, By.CHANGE, None, Delivery.KEEP, queryable=True, max_bytes=64 << 10)
+ROBOT_POSE = Topic("robot/pose", m.RobotPose, By.RATE, None, Delivery.NEWEST)
+HEALTH = Topic("{stage}/health", m.Health, By.RATE, 1.0, Delivery.KEEP, queryable=True)
+
+TOPICS: tuple[Topic, ...] = (
+    FRAME, CAMERA_INFO, TRACKS, HEAD_POSES, GESTURES, BELIEF, TARGET, STATE, POI, ROBOT_POSE, HEALTH,
+)  # fmt: skip
+
+
+def alive_key(robot: str, stage: str, instance: str) -> str:
+    """Liveliness token of one process of a stage."""
+    return f"deixis/{robot}/@alive/{stage}/{instance}"
+
+
+def topic_of(key: str) -> Topic | None:
+    """The row that a concrete key (or one with the robot's part) belongs to; None for a key outside the contract."""
+    parts = key.split("/")
+    if len(parts) < 4 or parts[0] != "deixis":
+        return None
+    for topic in TOPICS:
+        pattern = topic.path.split("/")
+        if len(pattern) == len(parts) - 2 and all(
+            p.startswith("{") or p == given for p, given in zip(pattern, parts[2:], strict=True)
+        ):
+            return topic
+    return None

@@ -1,0 +1,1 @@
+"""Deixis camera: devices, files and streams to frames"""

@@ -1,0 +1,1 @@
+"""Deixis fusion: evidence to belief over the points of interest"""

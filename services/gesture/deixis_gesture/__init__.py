@@ -1,0 +1,1 @@
+"""Deixis gesture: tracks to phases and pointing gestures"""

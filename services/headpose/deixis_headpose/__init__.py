@@ -1,0 +1,1 @@
+"""Deixis headpose: frames and tracks to head yaw"""

@@ -1,0 +1,1 @@
+"""Deixis tracker: frames to face and hand tracks"""
