@@ -1,0 +1,260 @@
+"""The camera stage: publishes what the capture thread has ready, when it is due, and says how the camera is."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import threading
+from pathlib import Path
+
+from deixis_runtime.queries import Query
+from deixis_runtime.stage import Node, run_stage
+from deixis_schemas import topics
+from deixis_schemas.messages import CameraInfo, Frame, HealthState, Message
+
+from .calibration import AssumedFieldOfView, Calibration, CalibrationError, load_calibration
+from .capture import THREAD_NAME, Capture
+from .config import CameraConfig
+from .handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
+from .info import CameraStatus
+from .lockstep import EPOCH_NS, Lockstep, Readiness, missing
+from .pacing import OwnRate
+from .sources import without_credentials
+
+INFO_PERIOD_S = 2.0
+STOP_WAIT_S = 1.0
+HEALTH: dict[str, HealthState] = {"retrying": "degraded", "failed": "failed"}
+
+
+class CameraStage:
+    """The loop thread's side of the camera. Everything that touches the node happens here."""
+
+    def __init__(self, node: Node, config: CameraConfig) -> None:
+        self._node = node
+        self._config = config
+        self._frames = node.publish(topics.FRAME)
+        self._infos = node.publish(topics.CAMERA_INFO)
+        self._beliefs = node.subscribe(topics.BELIEF, depth=8) if node.lockstep else None
+        self._status = CameraStatus(without_credentials(config.source), config.mount, node.lockstep)
+        self._handoff = Handoff()
+        self._lockstep = Lockstep(config.lockstep_timeout_s)
+        self._live = False
+        self._started = False
+        self._own_rate = OwnRate(0.0)
+        self._readiness: Readiness | None = None
+        self._hold_s = 0.0
+        self._info_due_s = 0.0
+        self._picture_s = 0.0
+        node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
+
+    def run(self) -> None:
+        """Until shutdown."""
+        capture = self._start_capture()
+        try:
+            while self._node.wait(timeout_s=self._next_s()):
+                self._step()
+        finally:
+            if capture is not None:
+                capture.stop(STOP_WAIT_S)
+
+    # --- starting -----------------------------------------------------------------------------------------------------
+
+    def _start_capture(self) -> Capture | None:
+        self._picture_s = self._node.monotonic_s()
+        try:
+            calibration = self._calibration()
+        except CalibrationError as error:
+            self._become(Became("failed", str(error)))
+            return None
+        node = self._node
+        capture = Capture(
+            self._config, calibration, self._handoff, lockstep=node.lockstep, now_ns=node.now_ns, wake=node.wake, log=node.log
+        )
+        capture.start()
+        return capture
+
+    def _calibration(self) -> Calibration:
+        if self._config.calibration is None:
+            return AssumedFieldOfView(self._config.horizontal_fov_deg)
+        return load_calibration(self._beside_site(self._config.calibration))
+
+    def _beside_site(self, name: str) -> Path:
+        folder = self._node.site.path.parent if self._node.site is not None else Path()
+        return folder / name
+
+    # --- each turn of the loop ----------------------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        self._take_answers()
+        self._hold_s = INFO_PERIOD_S
+        item = self._handoff.first()
+        while item is not None and not isinstance(item, Ready):
+            self._apply(item)
+            self._handoff.drop_first()
+            item = self._handoff.first()
+        if isinstance(item, Ready):
+            self._handle(item)
+        self._watch_for_stall()
+        overwritten = self._handoff.take_overwritten()
+        if overwritten:
+            self._node.count("pictures_overwritten", overwritten)
+        self._publish_info()
+
+    def _next_s(self) -> float:
+        return max(0.0, min(self._hold_s, self._info_due_s - self._node.monotonic_s()))
+
+    def _take_answers(self) -> None:
+        if self._beliefs is not None:
+            for belief in self._beliefs.take_all():
+                self._lockstep.answered(belief.frame_id)
+
+    def _handle(self, picture: Ready) -> None:
+        """Publish or drop the picture, or leave it for later and say for how long in `_hold_s`."""
+        if self._live:
+            self._publish(picture, picture.time_ns)
+        elif not self._others_ready():
+            self._hold_s = 0.1
+        elif self._node.lockstep:
+            self._feed(picture)
+        else:
+            self._play(picture)
+
+    def _play(self, picture: Ready) -> None:
+        now_ns = round(self._node.monotonic_s() * 1e9)
+        decision = self._own_rate.decide(picture.time_ns, now_ns, self._handoff.waiting_pictures() > 1)
+        if decision.act == "wait":
+            self._hold_s = decision.wait_s
+        elif decision.act == "drop":
+            self._node.count("pictures_skipped")
+            self._handoff.drop_first()
+            self._hold_s = 0.0
+        else:
+            if decision.fell_behind:
+                self._node.count("playback_fell_behind")
+            self._publish(picture, self._node.now_ns() - decision.late_ns)
+
+    def _feed(self, picture: Ready) -> None:
+        now_s = self._node.monotonic_s()
+        if not self._lockstep.may_feed(now_s):
+            self._hold_s = 0.1
+            return
+        unanswered = self._lockstep.given_up()
+        if unanswered is not None:
+            self._node.count("lockstep_unanswered")
+            limit = self._config.lockstep_timeout_s
+            self._node.warn("lockstep", f"fusion did not answer frame {unanswered} within {limit:g} s; the next is fed")
+        stamp_ns = EPOCH_NS + picture.time_ns
+        self._publish(picture, stamp_ns)
+        self._lockstep.sent((picture.seq, stamp_ns), now_s)
+
+    def _publish(self, picture: Ready, stamp_ns: int) -> None:
+        encoded, producer = picture.encoded, self._node.producer
+        with self._node.step():
+            frame = Frame(
+                seq=picture.seq,
+                stamp_ns=stamp_ns,
+                stage=producer.stage,
+                instance=producer.instance,
+                width=encoded.width,
+                height=encoded.height,
+                encoding=encoded.encoding,
+                data=encoded.data,
+            )
+            if self._status.projects(encoded.width, encoded.height, picture.intrinsics):
+                self._node.note("intrinsics", f"intrinsics: {picture.intrinsics.source}")
+            self._become(Became("streaming"))
+            self._publish_info()  # before the frame where it is news: who reads the frame needs its intrinsics
+            self._frames.put(frame)
+        self._status.published(picture.seq)
+        self._picture_s = self._node.monotonic_s()
+        self._handoff.drop_first()
+        self._hold_s = 0.0
+
+    def _others_ready(self) -> bool:
+        """Whether a recording may start: a clip's first frames are not to be lost."""
+        if self._started:
+            return True
+        node, config, now_s = self._node, self._config, self._node.monotonic_s()
+        longest_s = config.lockstep_start_s if node.lockstep else config.subscriber_wait_s
+        if self._readiness is None:
+            self._readiness = Readiness(now_s, longest_s)
+        alive = node.alive_stages() if node.lockstep else None
+        self._started = self._readiness.ready(alive, self._frames.matching(), now_s)
+        if self._started and self._readiness.timed_out(now_s):
+            node.warn("start", f"{missing(alive)} within {longest_s:g} s; the recording starts all the same")
+        return self._started
+
+    # --- what the capture thread reports ------------------------------------------------------------------------------
+
+    def _apply(self, item: Item) -> None:
+        if isinstance(item, Opened):
+            self._opened(item)
+        elif isinstance(item, Became):
+            self._become(item)
+        elif isinstance(item, Refused):
+            self._node.count("pictures_refused")
+            self._node.warn("picture", item.reason)
+        elif isinstance(item, Noted):
+            self._node.note(item.key, item.text)
+
+    def _opened(self, opened: Opened) -> None:
+        self._live = opened.live
+        limit = self._config.rate_hz
+        rate_hz = min(limit, opened.rate_hz) if limit and opened.rate_hz else limit or opened.rate_hz
+        self._status.has_rate(rate_hz)
+        self._picture_s = self._node.monotonic_s()
+        if not self._started:
+            self._own_rate = OwnRate(rate_hz)
+
+    def _become(self, became: Became) -> None:
+        if not self._status.become(became.state, became.reason):
+            return
+        health = "degraded" if became.broken else HEALTH.get(became.state, "ok")
+        self._node.set_state(health, became.reason if health != "ok" else "")
+        if became.state == "failed":
+            self._node.log.error("%s", became.reason)
+        elif became.state == "retrying" or became.broken:
+            self._node.log.warning("%s", became.reason)
+        else:
+            self._node.log.info("%s%s", became.state, f": {became.reason}" if became.reason else "")
+
+    def _watch_for_stall(self) -> None:
+        if not (self._live and self._status.state == "streaming"):
+            return
+        silent_s = self._node.monotonic_s() - self._picture_s
+        if silent_s > self._config.stalled_after_s:
+            self._become(Became("retrying", f"'{without_credentials(self._config.source)}' is open but gives no new pictures"))
+
+    # --- CameraInfo ---------------------------------------------------------------------------------------------------
+
+    def _publish_info(self) -> None:
+        now_s = self._node.monotonic_s()
+        if self._status.changed or now_s >= self._info_due_s:
+            self._infos.put(self._info())
+            self._status.changed = False
+            self._info_due_s = now_s + INFO_PERIOD_S
+
+    def _info(self) -> CameraInfo:
+        return self._status.info(self._node.producer, self._node.now_ns())
+
+    def _answer(self, _query: Query) -> list[tuple[str, Message]]:
+        return [(topics.CAMERA_INFO.key(self._node.robot), self._info())]
+
+
+def serve(node: Node, config: CameraConfig) -> None:
+    """Run the stage until shutdown."""
+    CameraStage(node, config).run()
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Console script `deixis-camera`."""
+    code = run_stage("camera", CameraConfig, serve, argv)
+    if any(thread.name == THREAD_NAME for thread in threading.enumerate()):
+        # A read hangs in FFmpeg or in the driver. It cannot be interrupted, and a thread that comes back from C++ while the
+        # interpreter shuts down aborts the process with a core dump.
+        logging.shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
