@@ -26,6 +26,7 @@ Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Share = Annotated[float, Field(ge=-1e-9, le=1 + 1e-9)]
 Pixel = Annotated[float, Field(ge=-4 * MAX_SIDE_PX, le=4 * MAX_SIDE_PX)]
+Extent = Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]
 Metre = Annotated[float, Field(ge=-1e5, le=1e5)]
 Degree = Annotated[float, Field(ge=-360, le=360)]
 Point = tuple[Pixel, Pixel]
@@ -160,12 +161,14 @@ class Track(Part):
     kind: TrackKind
     kind_probabilities: KindProbabilities
     centroid_px: Point
-    bbox_px: tuple[Pixel, Pixel, Annotated[float, Field(ge=0, le=MAX_SIDE_PX)], Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]] = (
-        Field(description="x, y of the top left corner, width, height. Of a face: the face itself, chin to brow, ear to ear.")
+    bbox_px: tuple[Pixel, Pixel, Extent, Extent] = Field(
+        description="x, y of the top left corner, width, height. Of a face: the face itself, chin to brow, ear to ear."
     )
     velocity_px_s: tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)]]
     contour: bytes = Field(
-        default=b"", max_length=MAX_CONTOUR_BYTES, description="Outline as packed little-endian int16 pairs x, y; empty if unseen."
+        default=b"",
+        max_length=MAX_CONTOUR_BYTES,
+        description="Outline: packed little-endian int16 pairs x, y.",
     )
     observed: bool = Field(default=True, description="Seen in this frame; false while it is only predicted.")
     confidence: Share = Field(default=1.0, description="Belief that the blob is what its kind says.")
@@ -408,10 +411,9 @@ class Health(Produced):
     inputs: list[InputHealth] = Field(default_factory=list, max_length=16)
     outputs: list[OutputHealth] = Field(default_factory=list, max_length=16)
     counters: dict[str, Count] = Field(default_factory=dict, max_length=64, description="Counters of the stage's own.")
-    notes: list[Text] = Field(default_factory=list, max_length=16, description="Conditions worth saying, e.g. assumed intrinsics.")
+    notes: list[Text] = Field(default_factory=list, max_length=16, description="Conditions, e.g. assumed intrinsics.")
 
 
 TYPES: dict[str, type[Message]] = {
-    cls.__name__: cls
-    for cls in (Frame, CameraInfo, Tracks, HeadPoses, Gestures, Belief, Target, State, Poi, RobotPose, Health)
+    cls.__name__: cls for cls in (Frame, CameraInfo, Tracks, HeadPoses, Gestures, Belief, Target, State, Poi, RobotPose, Health)
 }

@@ -1,5 +1,6 @@
 """The topic table: every key of Deixis with its type, rate and delivery. All else (publishers, health, recorder, docs,
-conformance) is derived from it."""
+conformance) is derived from it.
+"""
 
 from __future__ import annotations
 

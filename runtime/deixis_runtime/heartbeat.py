@@ -1,0 +1,76 @@
+"""The health record of a stage: gathered in its loop, so that a hung loop shows no heartbeat."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections import deque
+from statistics import median
+
+from deixis_schemas.messages import Health, HealthState, Producer
+
+from .inputs import Subscription
+from .outputs import Publisher
+
+PERIOD_S = 1.0
+
+
+class Heartbeat:
+    """Collects what the health record says."""
+
+    def __init__(self, producer: Producer) -> None:
+        self.state: HealthState = "ok"
+        self.reason = ""
+        self.counters: dict[str, int] = {}
+        self.notes: dict[str, str] = {}
+        self._producer = producer
+        self._count = 0
+        self._started_s = time.monotonic()
+        self._next_s = self._started_s
+        self._steps_ms: deque[float] = deque(maxlen=200)
+
+    def due_in_s(self) -> float:
+        """Seconds until the next record is due."""
+        return max(0.0, self._next_s - time.monotonic())
+
+    def step_took(self, seconds: float) -> None:
+        """Note the time of one step."""
+        self._steps_ms.append(seconds * 1e3)
+
+    def beat(self) -> None:
+        """Advance the count: the loop runs."""
+        self._count += 1
+        self._next_s = time.monotonic() + PERIOD_S
+
+    def record(self, now_ns: int, inputs: list[Subscription], outputs: list[Publisher]) -> Health:
+        """The record as of now."""
+        steps = list(self._steps_ms)
+        return Health(
+            stamp_ns=now_ns,
+            stage=self._producer.stage,
+            instance=self._producer.instance,
+            count=self._count,
+            state=self.state,
+            reason=self.reason[:2000],
+            pid=os.getpid(),
+            host=socket.gethostname(),
+            uptime_s=round(time.monotonic() - self._started_s, 3),
+            cpu_s=round(time.process_time(), 3),
+            rss_mb=round(resident_mb(), 1),
+            step_ms_p50=round(median(steps), 3) if steps else 0.0,
+            step_ms_max=round(max(steps), 3) if steps else 0.0,
+            inputs=[item.health() for item in inputs],
+            outputs=[item.health() for item in outputs],
+            counters=dict(self.counters),
+            notes=list(self.notes.values())[:16],
+        )
+
+
+def resident_mb() -> float:
+    """Resident memory of this process in MB; 0 where /proc does not tell."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    except (OSError, ValueError, IndexError):
+        return 0.0

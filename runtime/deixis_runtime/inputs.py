@@ -1,0 +1,156 @@
+"""What a stage hears: the newest samples of a key, decoded in the loop, counted and bounded."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import zenoh
+from deixis_schemas import codec
+from deixis_schemas.messages import InputHealth, Message, Produced
+from deixis_schemas.topics import Topic
+
+T = TypeVar("T", bound=Message)
+
+HEARD_WITHIN_S = 3.0
+MAX_PRODUCERS = 8
+
+
+class Subscription(Generic[T]):
+    """The last `depth` samples of one key.
+
+    The Zenoh callback only stores; a FIFO behind a slow consumer would lag without bound. Decoding happens in `take`, in
+    the stage's loop, where a bad payload is counted and reported and never raised.
+    """
+
+    def __init__(
+        self, topic: Topic, key: str, depth: int, wake: Callable[[], None], report: Callable[[str, str], None]
+    ) -> None:
+        self.topic = topic
+        self.key = key
+        self.received = 0
+        self.used = 0
+        self.overwritten = 0
+        self.rejected = 0
+        self.last_error = ""
+        self.last_error_kind = ""
+        self._too_old = 0
+        self._wake = wake
+        self._report = report
+        self._lock = threading.Lock()
+        self._samples: deque[zenoh.Sample] = deque(maxlen=depth)
+        self._heard: dict[str, tuple[float, float]] = {}
+        self._accepted_s: float | None = None
+        self._window = (time.monotonic(), 0)
+        self._rate_hz = 0.0
+
+    def store(self, sample: zenoh.Sample) -> None:
+        """Callback of the Zenoh subscriber; runs on one of its threads."""
+        with self._lock:
+            self.received += 1
+            if len(self._samples) == self._samples.maxlen:
+                self.overwritten += 1
+            self._samples.append(sample)
+        self._wake()
+
+    def pending(self) -> bool:
+        """Whether there is something to take."""
+        return bool(self._samples)
+
+    def take(self) -> T | None:
+        """The newest valid message not taken yet; older ones are dropped."""
+        messages = self.take_all()
+        if not messages:
+            return None
+        self.overwritten += len(messages) - 1
+        self.used -= len(messages) - 1
+        return messages[-1]
+
+    def take_all(self) -> list[T]:
+        """All kept valid messages not taken yet, oldest first."""
+        with self._lock:
+            samples = list(self._samples)
+            self._samples.clear()
+        messages = [message for sample in samples if (message := self._decode(sample)) is not None]
+        self.used += len(messages)
+        return messages
+
+    def too_old(self) -> None:
+        """Count a message that was dropped for its age."""
+        self._too_old += 1
+
+    def age_s(self) -> float | None:
+        """Seconds since the last accepted message; None if there was none."""
+        return None if self._accepted_s is None else time.monotonic() - self._accepted_s
+
+    def producers(self) -> list[str]:
+        """`stage/instance` of those who publish here now; more than one is worth an alarm.
+
+        A producer that fell silent before the newest one began was replaced by it, as after a restart, and is left out.
+        """
+        now = time.monotonic()
+        self._heard = {who: times for who, times in self._heard.items() if now - times[1] < HEARD_WITHIN_S}
+        if not self._heard:
+            return []
+        newest_began = max(first for first, _ in self._heard.values())
+        return sorted(who for who, (_, last) in self._heard.items() if last >= newest_began)
+
+    def health(self) -> InputHealth:
+        """Counters for the health record."""
+        now = time.monotonic()
+        since, before = self._window
+        if now - since >= 1.0:
+            self._rate_hz = (self.received - before) / (now - since)
+            self._window = (now, self.received)
+        return InputHealth(
+            key=self.key,
+            received=self.received,
+            used=self.used,
+            overwritten=self.overwritten,
+            too_old=self._too_old,
+            rejected=self.rejected,
+            last_error=self.last_error,
+            age_s=self.age_s(),
+            rate_hz=round(self._rate_hz, 2),
+            producers=self.producers(),
+        )
+
+    def _decode(self, sample: zenoh.Sample) -> T | None:
+        key = str(sample.key_expr)
+        try:
+            if sample.kind != zenoh.SampleKind.PUT:
+                raise codec.Malformed("a delete, which this key does not take")
+            message = codec.decode(
+                self.topic.type, sample.payload.to_bytes(), str(sample.encoding), max_bytes=self.topic.max_bytes
+            )
+        except codec.CodecError as error:
+            self.rejected += 1
+            self.last_error = str(error)[:500]
+            self.last_error_kind = _KINDS[type(error)]
+            self._report(f"rejected {key}", f"{key}: rejected: {error}")
+            return None
+        self._accepted_s = time.monotonic()
+        self.last_error_kind = ""
+        if isinstance(message, Produced):
+            self._hear(key, f"{message.stage}/{message.instance}")
+        return message  # type: ignore[return-value]
+
+    def _hear(self, key: str, who: str) -> None:
+        now = time.monotonic()
+        if who in self._heard:
+            self._heard[who] = (self._heard[who][0], now)
+        elif len(self._heard) < MAX_PRODUCERS:
+            self._heard[who] = (now, now)
+        producers = self.producers()
+        if len(producers) > 1:
+            self._report(f"producers {key}", f"{key}: more than one producer: {', '.join(producers)}")
+
+
+_KINDS: dict[type[codec.CodecError], str] = {
+    codec.WrongType: "wrong_type",
+    codec.WrongVersion: "wrong_version",
+    codec.Malformed: "malformed",
+}

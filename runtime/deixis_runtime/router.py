@@ -1,0 +1,94 @@
+"""The router of one host, as a process: stages are its clients, and only it faces the network.
+
+A Python session in router mode routes between clients. It stands in for zenohd, which the same settings serve.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import signal
+import threading
+from pathlib import Path
+
+import zenoh
+
+from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
+from .stage import EXIT_UNREACHABLE, setup_logging
+
+# A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
+LEASE_MS = 2000
+CHECK_S = 1.0
+
+log = logging.getLogger("deixis-router")
+
+
+def router_config(listen: list[str], connect: list[str], file: Path | None = None) -> zenoh.Config:
+    """Configuration of a host's router. Peers that are not there yet are tried again and again."""
+    config = base_config("router", file)
+    settings = {
+        "transport/link/tx/lease": LEASE_MS,
+        "listen/exit_on_failure": True,
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2},
+    }
+    if file is None:
+        put_settings(config, settings)
+    given = {side: json.loads(config.get_json(f"{side}/endpoints")) for side in ("listen", "connect")} if file else {}
+    put_settings(config, {"listen/endpoints": listen + _endpoints(given.get("listen"))})
+    put_settings(config, {"connect/endpoints": connect + _endpoints(given.get("connect"))})
+    return config
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the router until told to stop. Exit status 69 when it cannot listen."""
+    parser = argparse.ArgumentParser(prog="python -m deixis_runtime.router", description=main.__doc__)
+    parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT")
+    parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help="router of another host")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="Zenoh configuration (json5) to start from")
+    parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
+    given = parser.parse_args(argv)
+    setup_logging()
+    zenoh.init_log_from_env_or("error")
+    parent = os.getppid() if given.supervised else None
+    try:
+        session = zenoh.open(router_config(given.listen, given.connect, given.config))
+    except Unreachable as error:
+        log.error("%s", error)
+        return EXIT_UNREACHABLE
+    except zenoh.ZError as error:
+        where = ", ".join(given.listen)
+        log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
+        return EXIT_UNREACHABLE
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
+    _watch_links(session, given.connect, stop, parent)
+    close(session)
+    exit_now(0)
+    return 0
+
+
+def _watch_links(session: zenoh.Session, connect: list[str], stop: threading.Event, parent: int | None) -> None:
+    linked: bool | None = None
+    while not stop.wait(CHECK_S):
+        if parent is not None and os.getppid() != parent:
+            log.error("the supervisor is gone; stopping")
+            return
+        now = bool(session.info.routers_zid())
+        if connect and now != linked:
+            level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
+            log.log(level, text, ", ".join(connect))
+        linked = now
+
+
+def _endpoints(value: object) -> list[str]:
+    return [str(item) for item in value] if isinstance(value, list) else []
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

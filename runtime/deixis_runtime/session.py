@@ -1,0 +1,100 @@
+"""Opening and closing Zenoh sessions: explicit endpoints, no scouting, bounded waits."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+CONNECT_TIMEOUT_MS = 2000
+CLOSE_TIMEOUT_S = 3.0
+
+
+class Unreachable(ConnectionError):
+    """No router answers at the endpoint; the text names it."""
+
+
+def base_config(mode: str, file: Path | None = None) -> zenoh.Config:
+    """A Zenoh configuration with what every session of ours has in common. Raises Unreachable for a bad `file`."""
+    try:
+        config = zenoh.Config.from_file(str(file)) if file else zenoh.Config()
+    except zenoh.ZError as error:
+        raise Unreachable(f"Zenoh configuration {file}: {first_line(error)}") from None
+    config.insert_json5("mode", json.dumps(mode))
+    # Multicast scouting fails in containers, on Wi-Fi and on fresh interfaces, and lets robots find each other by accident.
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("scouting/gossip/enabled", "false")
+    return config
+
+
+def client_config(endpoint: str, *, shared_memory: bool = True) -> zenoh.Config:
+    """Configuration of a client of the router at `endpoint`."""
+    config = base_config("client")
+    config.insert_json5("transport/shared_memory/enabled", json.dumps(shared_memory))
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/timeout_ms", json.dumps(CONNECT_TIMEOUT_MS))
+    config.insert_json5("connect/exit_on_failure", "true")
+    return config
+
+
+@contextmanager
+def open_client(endpoint: str, *, shared_memory: bool = True) -> Iterator[zenoh.Session]:
+    """A client session, closed at the end within a bounded time.
+
+    A process that opens several sessions in turn goes without shared memory: each would leave 16 MB of it behind.
+
+    Raises Unreachable when no router answers. An uncaught exception with callbacks declared would leave a process that
+    never exits, so sessions are opened here and nowhere else.
+    """
+    zenoh.init_log_from_env_or("error")
+    try:
+        session = zenoh.open(client_config(endpoint, shared_memory=shared_memory))
+    except zenoh.ZError as error:
+        raise Unreachable(
+            f"no Zenoh router answers at {endpoint} ({first_line(error)}); start one with 'deixis run' or 'deixis up', "
+            f"or name another with --connect"
+        ) from None
+    try:
+        yield session
+    finally:
+        close(session)
+
+
+def close(session: zenoh.Session) -> None:
+    """Close a session; on a cut link Zenoh takes 10 s and raises, so this waits a bounded time only."""
+
+    def work() -> None:
+        with contextlib.suppress(zenoh.ZError):  # the link is gone already: there is nobody to say good-bye to
+            session.close()  # type: ignore[no-untyped-call]
+
+    thread = threading.Thread(target=work, daemon=True, name="zenoh-close")
+    thread.start()
+    thread.join(CLOSE_TIMEOUT_S)
+
+
+def exit_now(status: int) -> None:
+    """Leave the process at once, after flushing: Rust threads of a session that would not close keep it alive otherwise."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def first_line(error: BaseException) -> str:
+    """The text of a Zenoh error without the place in its source."""
+    text = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    return text.split(" at /")[0].strip(" !")
+
+
+def put_settings(config: zenoh.Config, settings: dict[str, Any]) -> None:
+    """Insert values under their paths into a configuration."""
+    for path, value in settings.items():
+        config.insert_json5(path, json.dumps(value))

@@ -1,0 +1,108 @@
+"""Settings of a stage: from the site file, then from `--set name=value`, checked by the stage's own model."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from deixis_schemas.codec import say
+from pydantic import BaseModel, ValidationError
+
+from .session import DEFAULT_ENDPOINT
+from .site import Site, SiteError, load_site
+
+C = TypeVar("C", bound=BaseModel)
+
+
+class ConfigError(ValueError):
+    """Settings that cannot be used; the text names the field and where it was set."""
+
+
+@dataclass(frozen=True)
+class CommonOptions:
+    """What every stage is told on its command line."""
+
+    robot: str
+    instance: str
+    connect: str
+    lockstep: bool
+    supervised: bool
+    site: Site | None
+    sets: tuple[str, ...]
+
+
+def parse_options(stage: str, description: str, argv: list[str] | None) -> CommonOptions:
+    """Read the command line of a stage. Raises ConfigError for a bad site file or name; SystemExit for bad usage."""
+    parser = argparse.ArgumentParser(prog=f"deixis-{stage}", description=description)
+    parser.add_argument("--robot", required=True, type=robot_name, help="name of the robot, the second part of every key")
+    parser.add_argument("--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (default: %(default)s)")
+    parser.add_argument("--site", type=Path, metavar="FILE", help="site file: camera, walls, points of interest, settings")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="sets", help="override one setting")
+    parser.add_argument("--instance", default=None, help="name of this process (default: host and process number)")
+    parser.add_argument("--lockstep", action="store_true", help="time is that of the frames; for reproducible runs")
+    parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
+    given = parser.parse_args(argv)
+    try:
+        site = load_site(given.site) if given.site else None
+    except SiteError as error:
+        raise ConfigError(str(error)) from None
+    return CommonOptions(
+        robot=given.robot,
+        instance=given.instance or default_instance(),
+        connect=given.connect,
+        lockstep=given.lockstep,
+        supervised=given.supervised,
+        site=site,
+        sets=tuple(given.sets),
+    )
+
+
+def load_config(stage: str, model: type[C], options: CommonOptions) -> C:
+    """The stage's settings. Raises ConfigError."""
+    content: dict[str, Any] = {}
+    if options.site is not None:
+        content |= options.site.settings.get(stage, {})
+        content |= options.site.camera if stage == "camera" else {}
+    for item in options.sets:
+        name, separator, text = item.partition("=")
+        if not separator:
+            raise ConfigError(f"--set {item}: not of the form NAME=VALUE")
+        content = _with(content, name.split("."), _value(item, text))
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        where = f" (site file {options.site.path}, --set)" if options.site else " (--set)"
+        raise ConfigError(f"settings of {stage}: {say(error)}{where}") from None
+
+
+def robot_name(text: str) -> str:
+    """A robot's name, checked: it becomes one part of every key. Raises argparse.ArgumentTypeError."""
+    if not re.fullmatch(r"[A-Za-z0-9_.\-]{1,64}", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a name of letters, digits, '_', '.' and '-'")
+    return text
+
+
+def default_instance() -> str:
+    """Name of this process: host and process number."""
+    host = re.sub(r"[^A-Za-z0-9_.\-]", "-", socket.gethostname())[:40] or "host"
+    return f"{host}-{os.getpid()}"
+
+
+def _value(item: str, text: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"--set {item}: the value is not YAML") from None
+
+
+def _with(content: dict[str, Any], path: list[str], value: Any) -> dict[str, Any]:
+    if len(path) == 1:
+        return {**content, path[0]: value}
+    inner = content.get(path[0])
+    return {**content, path[0]: _with(inner if isinstance(inner, dict) else {}, path[1:], value)}

@@ -1,0 +1,248 @@
+"""The thin shell that every stage runs in: session, loop, health, signals."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import zenoh
+from deixis_schemas import topics
+from deixis_schemas.messages import HealthState, Message, Producer
+from deixis_schemas.topics import Topic
+from pydantic import BaseModel
+
+from .heartbeat import Heartbeat
+from .inputs import Subscription
+from .limit import RateLimit
+from .outputs import Publisher
+from .queries import Answer, EditQueue, Query, QueryQueue
+from .session import Unreachable, exit_now, first_line, open_client
+from .settings import CommonOptions, ConfigError, load_config, parse_options
+
+C = TypeVar("C", bound=BaseModel)
+
+EXIT_CONFIG = 78
+EXIT_UNREACHABLE = 69
+IDLE_WAIT_S = 0.25
+MAX_COUNTERS = 64
+
+
+class Node:
+    """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
+
+    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions) -> None:
+        self.producer = Producer(stage, options.instance)
+        self.robot = options.robot
+        self.site = options.site
+        self.lockstep = options.lockstep
+        self.log = logging.getLogger(f"deixis-{stage}")
+        self.stopping = False
+        self._session = session
+        self._endpoint = options.connect
+        self._parent = os.getppid() if options.supervised else None
+        self._event = threading.Event()
+        self._limit = RateLimit()
+        self._reports: list[tuple[str, str]] = []
+        self._heartbeat = Heartbeat(self.producer)
+        self._inputs: list[Subscription] = []
+        self._outputs: list[Publisher] = []
+        self._queries: list[QueryQueue] = []
+        self._edits: list[EditQueue] = []
+        self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
+        self._alive: set[str] = set()
+        self._token: Any = None
+        self._health = self.publish(topics.HEALTH)
+        self.serve_get(self._health.key, self._answer_health)
+        self._watch_alive()
+
+    # --- keys ---------------------------------------------------------------------------------------------------------
+
+    def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
+        """Listen to a topic and keep its newest `depth` samples."""
+        key = topic.key(self.robot)
+        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn)
+        self._declared.append(self._session.declare_subscriber(key, subscription.store))
+        self._inputs.append(subscription)
+        return subscription
+
+    def subscribe_edits(self, key: str) -> EditQueue:
+        """Listen to puts and deletes on a key expression, each of which counts."""
+        queue = EditQueue(self.wake, self.warn)
+        self._declared.append(self._session.declare_subscriber(key, queue.store))
+        self._edits.append(queue)
+        return queue
+
+    def publish(self, topic: Topic) -> Publisher:
+        """A publisher of a topic of this stage."""
+        publisher = Publisher(self._session, topic, topic.key(self.robot, stage=self.producer.stage))
+        self._outputs.append(publisher)
+        return publisher
+
+    def serve_get(self, key: str, answer: Answer) -> None:
+        """Answer gets on a key expression; `answer` is called in the loop, from `wait`."""
+        queue = QueryQueue(answer, self.wake, self.warn)
+        self._declared.append(self._session.declare_queryable(key, queue.store))
+        self._queries.append(queue)
+
+    def alive_stages(self) -> set[str]:
+        """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
+        return {key.split("/")[-2] for key in tuple(self._alive)}
+
+    # --- loop ---------------------------------------------------------------------------------------------------------
+
+    def wait(self, timeout_s: float = IDLE_WAIT_S) -> bool:
+        """Wait for input, at most `timeout_s`; answer gets and send the heartbeat. False when the stage has to stop."""
+        if self._token is None:
+            self._declare_alive()
+        self._event.wait(min(timeout_s, self._heartbeat.due_in_s()))
+        self._event.clear()
+        for queue in self._queries:
+            queue.answer_all()
+        if self._heartbeat.due_in_s() == 0.0:
+            self._beat()
+        return not self.stopping
+
+    def wake(self) -> None:
+        """Make `wait` return; may be called from any thread."""
+        self._event.set()
+
+    def stop(self) -> None:
+        """Make the stage stop; may be called from any thread and from a signal handler."""
+        self.stopping = True
+        self._event.set()
+
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """Time one step of the stage for its health record."""
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._heartbeat.step_took(time.perf_counter() - began)
+
+    def now_ns(self) -> int:
+        """Wall clock, Unix nanoseconds."""
+        return time.time_ns()
+
+    def monotonic_s(self) -> float:
+        """Clock for intervals on this host, seconds."""
+        return time.monotonic()
+
+    # --- what the stage says of itself --------------------------------------------------------------------------------
+
+    def warn(self, kind: str, text: str) -> None:
+        """Log a warning, at most one line per kind and 10 seconds."""
+        left_out = self._limit.allow(kind, time.monotonic())
+        if left_out is not None:
+            self.log.warning("%s%s", text, f" ({left_out} more like it)" if left_out else "")
+
+    def count(self, name: str, n: int = 1) -> None:
+        """Advance a counter of the health record."""
+        counters = self._heartbeat.counters
+        if name in counters or len(counters) < MAX_COUNTERS:
+            counters[name] = counters.get(name, 0) + n
+
+    def set_state(self, state: HealthState, reason: str = "") -> None:
+        """Say in health whether the stage does its work."""
+        if (state, reason) != (self._heartbeat.state, self._heartbeat.reason):
+            self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
+        self._heartbeat.state, self._heartbeat.reason = state, reason
+
+    def note(self, key: str, text: str | None) -> None:
+        """Show a condition in health, or take it back with None."""
+        if text is None:
+            self._heartbeat.notes.pop(key, None)
+        else:
+            self._heartbeat.notes[key] = text[:2000]
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _beat(self) -> None:
+        self._heartbeat.beat()
+        self._health.put(self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))
+        if self._parent is not None and os.getppid() != self._parent:
+            self.log.error("the supervisor is gone; stopping")
+            self.stop()
+        if not self._session.info.routers_zid():
+            self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
+
+    def _answer_health(self, _query: Query) -> list[tuple[str, Message]]:
+        return [(self._health.key, self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))]
+
+    def _declare_alive(self) -> None:
+        # Only now, when all subscribers stand: whoever waits for the token may publish at once.
+        self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
+        self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
+
+    def _watch_alive(self) -> None:
+        def note(sample: zenoh.Sample) -> None:
+            key = str(sample.key_expr)
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._alive.add(key)
+            else:
+                self._alive.discard(key)
+            self.wake()
+
+        key = topics.alive_key(self.robot, "*", "*")
+        self._declared.append(self._session.liveliness().declare_subscriber(key, note, history=True))
+
+
+def run_stage(
+    stage: str, model: type[C], serve: Callable[[Node, C], None], argv: list[str] | None = None, description: str | None = None
+) -> int:
+    """Run one stage as this process: read settings, open the session, serve until told to stop.
+
+    Returns the exit status: 0 when told to stop, 78 for bad settings, 69 without a router, 1 for a fault of our own. Does
+    not return when a session is open that will not close: then the process ends here.
+    """
+    setup_logging()
+    log = logging.getLogger(f"deixis-{stage}")
+    try:
+        options = parse_options(stage, description or f"Deixis {stage} stage", argv)
+        config = load_config(stage, model, options)
+    except ConfigError as error:
+        log.error("%s", error)
+        return EXIT_CONFIG
+    try:
+        with open_client(options.connect) as session:
+            _serve(session, stage, options, config, serve)
+    except ConfigError as error:
+        log.error("%s", error)
+        exit_now(EXIT_CONFIG)
+    except Unreachable as error:
+        log.error("%s", error)
+        return EXIT_UNREACHABLE
+    except Exception:
+        log.exception("stopped by a fault")
+        exit_now(1)
+    log.info("stopped")
+    exit_now(0)
+    return 0
+
+
+def setup_logging() -> None:
+    """Log to standard error, one line per message."""
+    level = os.environ.get("DEIXIS_LOG", "INFO").upper()
+    logging.basicConfig(
+        level=level if level in logging.getLevelNamesMapping() else "INFO",
+        format="%(asctime)s %(name)s %(levelname)s %(message)s",
+        datefmt="%H:%M:%S",
+        stream=sys.stderr,
+    )
+
+
+def _serve(session: zenoh.Session, stage: str, options: CommonOptions, config: C, serve: Callable[[Node, C], None]) -> None:
+    try:
+        node = Node(session, stage, options)
+    except zenoh.ZError as error:
+        raise Unreachable(f"the router at {options.connect} refused the stage: {first_line(error)}") from None
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: node.stop())
+    serve(node, config)
