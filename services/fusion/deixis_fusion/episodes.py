@@ -1,0 +1,112 @@
+"""Pointing episodes: from a stroke to its one final answer.
+
+An episode opens when a pointing stroke has lasted long enough, goes on through short drop-outs, and ends when the hand is
+withdrawn, the person is lost or the source ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .config import FusionConfig
+from .stroke import Sample
+
+
+@dataclass
+class Stroke:
+    """One stroke of one person; an episode once it `is_open`."""
+
+    started_ns: int
+    last_pointing_ns: int
+    episode_id: str = ""
+    samples: list[Sample] = field(default_factory=list)
+    not_pointing: int = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has lasted long enough to be an episode."""
+        return bool(self.episode_id)
+
+
+class EpisodeTracker:
+    """Follows the strokes of one person, frame by frame. Times are stamps of frames, nanoseconds."""
+
+    def __init__(self, person_id: int, config: FusionConfig) -> None:
+        self._person_id = person_id
+        self._config = config
+        self._count = 0
+        self._turn: list[Sample] = []
+        self.stroke: Stroke | None = None
+
+    @property
+    def open_episode(self) -> Stroke | None:
+        """The stroke in progress, where it is an episode."""
+        return self.stroke if self.stroke is not None and self.stroke.is_open else None
+
+    def observe(self, sample: Sample) -> Stroke | None:
+        """Take in the next frame. Returns the episode that it ended, for its final answer."""
+        ended = self._end_after_gap(sample.stamp_ns) or self._end_after_turn(sample)
+        if sample.pointing:
+            self._extend(sample)
+        elif sample.not_pointing and self.stroke is not None:
+            self.stroke.not_pointing += 1
+        self._open_if_long_enough()
+        return ended
+
+    def finish(self) -> Stroke | None:
+        """End whatever goes on. Returns the episode that it ended, for its final answer."""
+        episode = self.open_episode
+        self.stroke, self._turn = None, []
+        return episode
+
+    def _end_after_gap(self, stamp_ns: int) -> Stroke | None:
+        if self.stroke is None or stamp_ns - self.stroke.last_pointing_ns <= self._config.max_gap_s * 1e9:
+            return None
+        return self.finish()
+
+    def _end_after_turn(self, sample: Sample) -> Stroke | None:
+        """A hand that swings over to the other side and stays there begins another episode, without a retraction between."""
+        if self.stroke is None or not _opposes(sample, self.stroke):
+            if sample.pointing and sample.pointing != "invisible":
+                self._turn = []
+            return None
+        self._turn.append(sample)
+        if sample.stamp_ns - self._turn[0].stamp_ns < self._config.swing_s * 1e9:
+            return None
+        turn = self._turn[:-1]
+        ended = self.open_episode
+        if ended is not None:
+            ended.samples = [old for old in ended.samples if old.stamp_ns < turn[0].stamp_ns]
+            ended.last_pointing_ns = ended.samples[-1].stamp_ns if ended.samples else ended.started_ns
+        self.stroke, self._turn = None, []
+        for old in turn:
+            self._extend(old)
+        return ended
+
+    def _extend(self, sample: Sample) -> None:
+        if self.stroke is None:
+            self.stroke = Stroke(sample.stamp_ns, sample.stamp_ns)
+        self.stroke.last_pointing_ns = sample.stamp_ns
+        self.stroke.samples.append(sample)
+        oldest_ns = sample.stamp_ns - self._config.max_episode_s * 1e9
+        if self.stroke.samples[0].stamp_ns < oldest_ns:
+            self.stroke.samples = [kept for kept in self.stroke.samples if kept.stamp_ns >= oldest_ns]
+
+    def _open_if_long_enough(self) -> None:
+        stroke = self.stroke
+        if stroke is None or stroke.is_open:
+            return
+        lasted_ns = stroke.last_pointing_ns - stroke.started_ns
+        if lasted_ns < self._config.min_stroke_s * 1e9 or stroke.not_pointing >= len(stroke.samples):
+            return
+        self._count += 1
+        stroke.episode_id = f"p{self._person_id}-{stroke.started_ns}-{self._count}"
+
+
+def _opposes(sample: Sample, stroke: Stroke) -> bool:
+    """Whether the sample points to the side opposite to what the stroke has shown so far."""
+    if sample.pointing not in ("point_left", "point_right"):
+        return False
+    other = "point_right" if sample.pointing == "point_left" else "point_left"
+    own = sum(1 for old in stroke.samples if old.pointing == sample.pointing)
+    return sum(1 for old in stroke.samples if old.pointing == other) > own
