@@ -51,7 +51,7 @@ def test_a_file_opened_again_starts_at_its_first_frame(tmp_path: Path) -> None:
 def test_a_gif_keeps_the_pause_of_each_picture(tmp_path: Path) -> None:
     animation = cv2.Animation()
     animation.frames = [np.full((80, 100, 4), 40 * i, np.uint8) for i in range(1, 6)]
-    animation.durations = np.array([100, 200, 50, 100, 100])
+    animation.durations = [100, 200, 50, 100, 100]
     path = tmp_path / "wave.gif"
     assert cv2.imwriteanimation(str(path), animation)
     frames, said = read_all(VideoFile(path))

@@ -1,6 +1,7 @@
 """Folders of pictures."""
 
 from pathlib import Path
+from random import Random
 
 import cv2
 import numpy as np
@@ -39,9 +40,11 @@ def test_pictures_come_in_the_natural_order_of_their_names(tmp_path: Path) -> No
     assert [path.name for path in picture_files(tmp_path)] == ["F1.PNG", "f1b.png", "f2.png", "f10.png"]
 
 
-@given(st.lists(st.text(alphabet="ab019_.٣²", max_size=6), max_size=12))
-def test_natural_order_sorts_any_names_the_same_way_whatever_their_first_order(names: list[str]) -> None:
-    assert sorted(names, key=natural_order) == sorted(names[::-1], key=natural_order)
+@given(st.lists(st.text(alphabet="ab019_.٣²", max_size=6), max_size=12), st.randoms(use_true_random=False))
+def test_natural_order_sorts_any_names_the_same_way_whatever_their_first_order(names: list[str], random: Random) -> None:
+    shuffled = names.copy()
+    random.shuffle(shuffled)
+    assert sorted(names, key=natural_order) == sorted(shuffled, key=natural_order)
 
 
 def test_a_folder_plays_at_five_pictures_a_second_or_as_asked(tmp_path: Path) -> None:
@@ -59,18 +62,23 @@ def test_an_unreadable_picture_among_good_ones_is_refused_alone_and_keeps_its_nu
     good = (tmp_path / "1.png").read_bytes()
     (tmp_path / "4.png").write_bytes(good[:40])
     write_picture(tmp_path / "5.png")
+    write_picture(tmp_path / "whole.jpg")
+    (tmp_path / "6.jpg").write_bytes((tmp_path / "whole.jpg").read_bytes()[:-2])
+    (tmp_path / "whole.jpg").unlink()
     found = read_all(Pictures(tmp_path))
     assert [item.seq for item in found if isinstance(item, Picture)] == [0, 4]
     said = [item for item in found if isinstance(item, str)]
-    assert [text.split("'")[1] for text in said] == ["2.png", "3.png", "4.png"]
+    assert [text.split("'")[1] for text in said] == ["2.png", "3.png", "4.png", "6.jpg"]
     assert "is empty" in said[1]
+    assert "is cut off" in said[3]
 
 
 def test_depth_and_channels_of_a_picture_are_kept_for_the_normaliser(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((70, 90), 9, np.uint8))
     cv2.imwrite(str(tmp_path / "deep.png"), np.full((70, 90, 3), 40_000, np.uint16))
     deep, grey = (picture.image for picture in read_all(Pictures(tmp_path)) if isinstance(picture, Picture))
-    assert (grey.ndim, grey.dtype, deep.shape, deep.dtype) == (2, np.uint8, (70, 90, 3), np.uint16)
+    assert (grey.shape, grey.dtype.name) == ((70, 90), "uint8")
+    assert (deep.shape, deep.dtype.name) == ((70, 90, 3), "uint16")
 
 
 def test_a_folder_without_pictures_is_refused_and_its_files_counted(tmp_path: Path) -> None:

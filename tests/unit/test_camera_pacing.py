@@ -48,7 +48,8 @@ def test_a_recording_plays_at_its_own_rate() -> None:
     rate = OwnRate(25.0)
     assert rate.decide(0, 1000 * MS, True).act == "publish"
     early = rate.decide(40 * MS, 1010 * MS, True)
-    assert (early.act, early.wait_s) == ("wait", pytest.approx(0.030))
+    assert early.act == "wait"
+    assert early.wait_s == pytest.approx(0.030)
     due = rate.decide(40 * MS, 1043 * MS, True)
     assert (due.act, due.late_ns) == ("publish", 3 * MS)
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from .sources import Image, Picture, PictureRefused, SourceRefused
 
@@ -71,15 +72,30 @@ def natural_order(name: str) -> tuple[list[tuple[int, int, str]], str]:
 def read_picture(path: Path) -> Image:
     """The picture, (H, W) or (H, W, 3), 8 or 16 bit, upright by its EXIF entry. Raises PictureRefused."""
     try:
-        size = path.stat().st_size
+        data = path.read_bytes()
     except OSError as error:
         raise PictureRefused(f"picture '{path.name}' cannot be read: {error.strerror or error}") from None
-    if size == 0:
+    if not data:
         raise PictureRefused(f"picture '{path.name}' is empty (0 bytes)")
+    if data.startswith(b"\xff\xd8") and not jpeg_is_whole(data):
+        raise PictureRefused(f"picture '{path.name}' is cut off")
     try:
-        image = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
     except cv2.error as error:
         raise PictureRefused(f"picture '{path.name}' cannot be decoded: {error.err or 'too large'}") from None
     if image is None:
-        raise PictureRefused(f"picture '{path.name}' cannot be decoded: not a picture, damaged, or not permitted to be read")
+        raise PictureRefused(f"picture '{path.name}' cannot be decoded: not a picture, or damaged")
     return image
+
+
+def jpeg_is_whole(data: bytes) -> bool:
+    """Whether the end marker follows the start of scan (ITU-T T.81, B.1); OpenCV fills a cut-off picture up with grey.
+
+    Segments before the scan are skipped by their length: a thumbnail in one of them has an end marker of its own.
+    """
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        if data[place + 1] == 0xDA:
+            return data.find(b"\xff\xd9", place) >= 0
+        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return False

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import os
-import sys
-import threading
 from pathlib import Path
 
 from deixis_runtime.queries import Query
@@ -14,7 +10,7 @@ from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Frame, HealthState, Message
 
 from .calibration import AssumedFieldOfView, Calibration, CalibrationError, load_calibration
-from .capture import THREAD_NAME, Capture
+from .capture import Capture
 from .config import CameraConfig
 from .handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
 from .info import CameraStatus
@@ -210,13 +206,9 @@ class CameraStage:
     def _become(self, became: Became) -> None:
         if not self._status.become(became.state, became.reason):
             return
-        health = "degraded" if became.broken else HEALTH.get(became.state, "ok")
+        health: HealthState = "degraded" if became.broken else HEALTH.get(became.state, "ok")
         self._node.set_state(health, became.reason if health != "ok" else "")
-        if became.state == "failed":
-            self._node.log.error("%s", became.reason)
-        elif became.state == "retrying" or became.broken:
-            self._node.log.warning("%s", became.reason)
-        else:
+        if health == "ok":
             self._node.log.info("%s%s", became.state, f": {became.reason}" if became.reason else "")
 
     def _watch_for_stall(self) -> None:
@@ -249,12 +241,4 @@ def serve(node: Node, config: CameraConfig) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Console script `deixis-camera`."""
-    code = run_stage("camera", CameraConfig, serve, argv)
-    if any(thread.name == THREAD_NAME for thread in threading.enumerate()):
-        # A read hangs in FFmpeg or in the driver. It cannot be interrupted, and a thread that comes back from C++ while the
-        # interpreter shuts down aborts the process with a core dump.
-        logging.shutdown()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-    return code
+    return run_stage("camera", CameraConfig, serve, argv)

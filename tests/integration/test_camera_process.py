@@ -1,0 +1,320 @@
+"""The camera as a process, behind a real router: what others receive from it."""
+
+import contextlib
+import hashlib
+import http.server
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import zenoh
+from deixis_runtime.session import open_client
+from deixis_schemas import codec, topics
+from deixis_schemas.messages import Belief, CameraInfo, Frame, Health, Producer
+
+STAGES_BUT_CAMERA = ("tracker", "headpose", "gesture", "fusion")
+PATIENCE_S = 20.0
+
+
+def wait_for(condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
+    deadline = time.monotonic() + patience_s
+    while not condition():
+        assert time.monotonic() < deadline, f"{what} did not come within {patience_s:g} s"
+        time.sleep(0.01)
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Endpoint of a router on loopback."""
+    name = f"tcp/127.0.0.1:{free_port()}"
+    router = subprocess.Popen([sys.executable, "-m", "deixis_runtime.router", "--listen", name], stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        with contextlib.suppress(ConnectionError), open_client(name, shared_memory=False):
+            break
+        assert time.monotonic() < deadline
+        assert router.poll() is None
+    yield name
+    router.terminate()
+    router.wait(10)
+
+
+class Watcher:
+    """Receives what a camera publishes; in lockstep it answers as fusion does."""
+
+    def __init__(self, session: zenoh.Session, robot: str, *, answers: bool = False, stages: tuple[str, ...] = ()) -> None:
+        self.session = session
+        self.robot = robot
+        self.frames: list[Frame] = []
+        self.infos: list[CameraInfo] = []
+        self.healths: list[Health] = []
+        self.unanswered = 0
+        self.most_unanswered = 0
+        self._answers = answers
+        self._declared: list[object] = [
+            session.declare_subscriber(topics.FRAME.key(robot), self._frame),
+            session.declare_subscriber(topics.CAMERA_INFO.key(robot), self._info),
+            session.declare_subscriber(topics.HEALTH.key(robot, stage="camera"), self._health),
+            *(session.liveliness().declare_token(topics.alive_key(robot, stage, "test")) for stage in stages),
+        ]
+
+    def answer(self, frame: Frame) -> None:
+        """Publish fusion's belief of a frame."""
+        belief = Belief.derive(frame, Producer("fusion", "test"))
+        self.session.put(topics.BELIEF.key(self.robot), codec.encode(belief), encoding=codec.encoding_of(Belief))
+        self.unanswered -= 1
+
+    def state(self) -> str:
+        return self.infos[-1].state if self.infos else ""
+
+    def get(self, key: str) -> list[dict[str, Any]]:
+        """Replies to a get, as JSON."""
+        replies = self.session.get(f"{key}?format=json", timeout=5.0)
+        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None]
+
+    def digest(self) -> list[tuple[int, int, str]]:
+        return [(frame.seq, frame.stamp_ns, hashlib.sha256(frame.data).hexdigest()) for frame in self.frames]
+
+    def _frame(self, sample: zenoh.Sample) -> None:
+        frame = codec.decode(Frame, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topics.FRAME.max_bytes)
+        self.unanswered += 1
+        self.most_unanswered = max(self.most_unanswered, self.unanswered)
+        self.frames.append(frame)
+        if self._answers:
+            threading.Timer(0.01, self.answer, [frame]).start()
+
+    def _info(self, sample: zenoh.Sample) -> None:
+        self.infos.append(codec.decode(CameraInfo, sample.payload.to_bytes(), str(sample.encoding)))
+
+    def _health(self, sample: zenoh.Sample) -> None:
+        self.healths.append(codec.decode(Health, sample.payload.to_bytes(), str(sample.encoding)))
+
+
+class Camera:
+    """A camera process; `said` is its standard error."""
+
+    def __init__(self, endpoint: str, robot: str, log: Path, *arguments: str) -> None:
+        script = Path(sys.executable).parent / "deixis-camera"
+        command = [str(script), "--robot", robot, "--connect", endpoint, *arguments]
+        self._log = log
+        with log.open("wb") as file:
+            self.process = subprocess.Popen(command, stderr=file, env={**os.environ, "DEIXIS_LOG": "INFO"})
+
+    @property
+    def said(self) -> str:
+        return self._log.read_text()
+
+    def stop(self) -> float:
+        """Ask it to stop; the seconds that took."""
+        began = time.monotonic()
+        self.process.terminate()
+        self.process.wait(10)
+        return time.monotonic() - began
+
+
+@contextlib.contextmanager
+def camera_and_watcher(
+    endpoint: str, folder: Path, *arguments: str, answers: bool = False, stages: tuple[str, ...] = ()
+) -> Iterator[tuple[Camera, Watcher]]:
+    robot = f"r{len(list(folder.glob('*.log')))}-{folder.name}"[:60]
+    with open_client(endpoint, shared_memory=False) as session:
+        watcher = Watcher(session, robot, answers=answers, stages=stages)
+        camera = Camera(endpoint, robot, folder / f"{robot}.log", *arguments)
+        try:
+            yield camera, watcher
+        finally:
+            if camera.process.poll() is None:
+                camera.stop()
+
+
+def write_film(path: Path, frames: int = 20, rate_hz: float = 25.0) -> Path:
+    code, backend = ("MJPG", cv2.CAP_OPENCV_MJPEG) if path.suffix == ".avi" else ("mp4v", cv2.CAP_FFMPEG)
+    writer = cv2.VideoWriter(str(path), backend, cv2.VideoWriter.fourcc(*code), rate_hz, (320, 240))
+    for index in range(frames):
+        picture = np.full((240, 320, 3), 60, np.uint8)
+        picture[:, 10 * (index % 30) :][:, :10] = 220
+        writer.write(picture)
+    writer.release()
+    return path
+
+
+def test_a_film_is_published_whole_at_its_own_rate_and_its_end_is_said(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4")
+    with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (camera, watcher):
+        wait_for(lambda: watcher.state() == "ended", "the end")
+        assert [frame.seq for frame in watcher.frames] == list(range(20))
+        stamps = np.array([frame.stamp_ns for frame in watcher.frames])
+        assert np.diff(stamps) == pytest.approx(40e6, abs=2e6)
+        assert abs(time.time_ns() - stamps[-1]) < 10e9
+        info = watcher.infos[-1]
+        assert (info.last_seq, info.width, info.height, info.rate_hz, info.lockstep) == (19, 320, 240, 25.0, False)
+        assert info.camera_matrix is not None
+        assert info.camera_matrix[0] == pytest.approx(160 / np.tan(np.radians(30)))
+        assert "assumed from a horizontal field of view of 60 degrees" in info.intrinsics
+        first = watcher.infos.index(next(item for item in watcher.infos if item.width))
+        assert watcher.infos[first].last_seq == -1, "the intrinsics are there before the first frame"
+        assert watcher.get(topics.CAMERA_INFO.key(watcher.robot))[0]["state"] == "ended"
+        assert any("assumed" in note for note in watcher.get(topics.HEALTH.key(watcher.robot, stage="camera"))[0]["notes"])
+        assert camera.stop() < 3
+        assert camera.process.returncode == 0
+
+
+def test_lockstep_gives_equal_frames_in_two_runs_and_never_two_unanswered(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4")
+    runs = []
+    for _ in range(2):
+        arguments = ("--lockstep", "--set", f"source={film}")
+        with camera_and_watcher(endpoint, tmp_path, *arguments, answers=True, stages=STAGES_BUT_CAMERA) as (_, watcher):
+            wait_for(lambda: watcher.state() == "ended", "the end")
+            runs.append(watcher.digest())
+            assert watcher.most_unanswered == 1
+            assert watcher.infos[-1].lockstep
+            assert watcher.healths[-1].counters.get("lockstep_unanswered", 0) == 0
+    assert [seq for seq, _, _ in runs[0]] == list(range(20))
+    assert np.diff([stamp for _, stamp, _ in runs[0]]) == pytest.approx(40e6)
+    assert runs[0] == runs[1]
+
+
+def test_lockstep_goes_on_without_answers_and_counts_them(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=5)
+    arguments = ("--lockstep", "--set", f"source={film}", "--set", "lockstep_timeout_s=0.2")
+    with camera_and_watcher(endpoint, tmp_path, *arguments, stages=STAGES_BUT_CAMERA) as (camera, watcher):
+        wait_for(lambda: watcher.state() == "ended", "the end")
+        wait_for(lambda: watcher.healths[-1].counters.get("lockstep_unanswered", 0) >= 4, "the count")
+        assert [frame.seq for frame in watcher.frames] == list(range(5))
+        assert camera.said.count("fusion did not answer") == 1, "said once in ten seconds"
+
+
+def test_lockstep_waits_for_the_stages_that_answer(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=3)
+    with camera_and_watcher(endpoint, tmp_path, "--lockstep", "--set", f"source={film}", answers=True) as (_, watcher):
+        wait_for(lambda: len(watcher.healths) >= 3, "heartbeats")
+        assert watcher.frames == []
+        tokens = [
+            watcher.session.liveliness().declare_token(topics.alive_key(watcher.robot, stage, "test"))
+            for stage in STAGES_BUT_CAMERA
+        ]
+        wait_for(lambda: watcher.state() == "ended", "the end")
+        assert [frame.seq for frame in watcher.frames] == [0, 1, 2]
+        assert len(tokens) == 4
+
+
+def test_a_camera_that_is_not_there_is_retried_and_the_stage_lives_on(endpoint: str, tmp_path: Path) -> None:
+    arguments = ("--set", "source=873", "--set", "retry_first_s=0.1", "--set", "retry_longest_s=0.2")
+    with camera_and_watcher(endpoint, tmp_path, *arguments) as (camera, watcher):
+        wait_for(lambda: len(watcher.healths) >= 3 and watcher.healths[-1].state == "degraded", "heartbeats")
+        assert watcher.state() == "retrying"
+        assert "'/dev/video873' is not there" in watcher.infos[-1].reason
+        assert watcher.healths[-1].count > watcher.healths[-2].count
+        assert watcher.get(topics.CAMERA_INFO.key(watcher.robot))[0]["state"] == "retrying"
+        assert camera.said.count("/dev/video873") == 1, "one line, not one per retry"
+        assert camera.stop() < 3
+
+
+def test_a_missing_file_is_a_final_failure_that_can_be_asked_for(endpoint: str, tmp_path: Path) -> None:
+    with camera_and_watcher(endpoint, tmp_path, "--set", f"source={tmp_path}/none.mp4") as (_, watcher):
+        wait_for(lambda: bool(watcher.healths) and watcher.healths[-1].state == "failed", "the failure")
+        answer = watcher.get(topics.CAMERA_INFO.key(watcher.robot))[0]
+        assert (answer["state"], answer["reason"]) == ("failed", f"file '{tmp_path}/none.mp4' does not exist")
+
+
+def test_a_film_that_is_cut_off_plays_to_the_cut_and_health_says_so(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.avi", frames=30)
+    film.write_bytes(film.read_bytes()[: film.stat().st_size // 2])
+    with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (_, watcher):
+        wait_for(lambda: watcher.state() == "ended" and bool(watcher.healths), "the end")
+        assert len(watcher.frames) >= 8
+        assert f"{len(watcher.frames)} of about 30 frames could be read" in watcher.infos[-1].reason
+        wait_for(lambda: watcher.healths[-1].state == "degraded", "the state")
+
+
+def test_a_bad_calibration_is_named_and_no_frame_goes_out(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=3)
+    site = tmp_path / "site.yaml"
+    site.write_text(f"camera: {{source: {film}, calibration: cam.yaml}}\n")
+    (tmp_path / "cam.yaml").write_text("image_width: 640\n")
+    with camera_and_watcher(endpoint, tmp_path, "--site", str(site)) as (_, watcher):
+        wait_for(lambda: watcher.state() == "failed", "the failure")
+        assert f"calibration '{tmp_path}/cam.yaml': image_height" in watcher.infos[-1].reason
+        assert watcher.frames == []
+
+
+def test_the_site_file_gives_calibration_and_mount(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=3)
+    (tmp_path / "cam.yaml").write_text(
+        "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\n"
+        "camera_matrix: {rows: 3, cols: 3, data: [600, 0, 319.5, 0, 600, 239.5, 0, 0, 1]}\n"
+        "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0]}\n"
+    )
+    site = tmp_path / "site.yaml"
+    site.write_text(
+        f"camera:\n  source: {film}\n  calibration: cam.yaml\n  mount: {{position_m: [0.1, 0, 1.4], pitch_up_deg: 5}}\n"
+    )
+    with camera_and_watcher(endpoint, tmp_path, "--site", str(site)) as (_, watcher):
+        wait_for(lambda: watcher.state() == "ended", "the end")
+        info = watcher.infos[-1]
+        assert info.camera_matrix == pytest.approx((300, 0, 159.5, 0, 300, 119.5, 0, 0, 1))
+        assert (info.distortion_model, info.distortion) == ("plumb_bob", [0.1, 0, 0, 0, 0])
+        assert (info.mount.position_m, info.mount.pitch_up_deg) == ((0.1, 0.0, 1.4), 5.0)
+
+
+@pytest.fixture
+def hanging_camera() -> Iterator[str]:
+    """URL of an IP camera that sends a second of pictures and then nothing, with the line open."""
+    over = threading.Event()
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+            self.end_headers()
+            data = cv2.imencode(".jpg", np.full((120, 160, 3), 90, np.uint8))[1].tobytes()
+            with contextlib.suppress(OSError):
+                for _ in range(30):
+                    head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+                    self.wfile.write(head.encode() + data + b"\r\n")
+                    over.wait(0.03)
+            over.wait(30)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://admin:s3cret@127.0.0.1:{server.server_address[1]}/video?key=s3cret"
+    over.set()
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_stream_that_hangs_stops_neither_heartbeats_nor_shutdown_and_shows_no_password(
+    endpoint: str, tmp_path: Path, hanging_camera: str
+) -> None:
+    arguments = ("--set", f"source={hanging_camera}", "--set", "read_timeout_s=30", "--set", "stalled_after_s=0.5")
+    with camera_and_watcher(endpoint, tmp_path, *arguments) as (camera, watcher):
+        wait_for(lambda: len(watcher.frames) > 5, "frames")
+        wait_for(lambda: watcher.state() == "retrying", "the stall")
+        assert "is open but gives no new pictures" in watcher.infos[-1].reason
+        beats = len(watcher.healths)
+        wait_for(lambda: len(watcher.healths) >= beats + 2, "heartbeats", 4)
+        assert watcher.healths[-1].state == "degraded"
+        assert camera.stop() < 4
+        assert camera.process.returncode == 0
+        assert "s3cret" not in camera.said + str(watcher.infos) + str(watcher.healths)
+        assert "admin" not in camera.said
