@@ -1,0 +1,66 @@
+"""Writes what other languages need of the contract: JSON Schema and golden bytes of every type, and the topic table.
+
+python -m deixis_schemas.export schemas/contract
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from . import codec
+from .messages import TYPES, Message
+from .samples import SAMPLES
+from .topics import TOPICS
+
+
+def contract_files() -> dict[str, bytes]:
+    """Content of every file of the contract folder, by name."""
+    files = {"topics.md": topic_table().encode()}
+    for name, type_ in TYPES.items():
+        files[f"{name}.schema.json"] = json_schema(type_)
+    for sample in SAMPLES:
+        name = type(sample).__name__
+        files[f"{name}.golden.msgpack"] = codec.encode(sample)
+        files[f"{name}.golden.json"] = json.dumps(json.loads(codec.encode_json(sample)), indent=1).encode() + b"\n"
+    return files
+
+
+def json_schema(type_: type[Message]) -> bytes:
+    """JSON Schema of a type; binary fields are strings in it, raw bytes in msgpack."""
+    schema = {"$id": f"{type_.__name__}/{type_.VERSION}", **type_.model_json_schema()}
+    return json.dumps(schema, indent=1, sort_keys=True).encode() + b"\n"
+
+
+def topic_table() -> str:
+    """The topic table in Markdown."""
+    rows = [
+        "| key under `deixis/{robot}/` | type / version | when | delivery | by get | most bytes |",
+        "|---|---|---|---|---|---|",
+    ]
+    for topic in TOPICS:
+        rate = f", {topic.rate_hz:g} Hz expected" if topic.rate_hz else ""
+        rows.append(
+            f"| `{topic.path}` | {topic.type.__name__}/{topic.version} | {topic.by.value}{rate} | {topic.delivery.value} "
+            f"| {'yes' if topic.queryable else 'no'} | {topic.max_bytes} |"
+        )
+    return (
+        "# Topics\n\nWritten by `python -m deixis_schemas.export`; edit `deixis_schemas/topics.py`.\n\n"
+        + "\n".join(rows)
+        + "\n"
+    )
+
+
+def main() -> None:
+    """Write the contract folder."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("folder", type=Path)
+    folder: Path = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in contract_files().items():
+        (folder / name).write_bytes(content)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""The codec refuses what it must and gives back what it got."""
+
+import math
+
+import msgpack
+import pytest
+from deixis_schemas import codec
+from deixis_schemas import messages as m
+from deixis_schemas.samples import FRAME, SAMPLES
+from hypothesis import given
+from hypothesis import strategies as st
+
+TRACKS = m.Tracks.derive(FRAME, m.Producer("tracker", "t"), width=4, height=4)
+LABEL = codec.encoding_of(m.Tracks)
+finite = st.floats(-1000, 1000)
+
+
+def changed(message, **fields):
+    return msgpack.packb({**message.model_dump(), **fields})
+
+
+@given(
+    st.lists(
+        st.builds(
+            m.Track,
+            track_id=st.integers(0, 2**40),
+            person_id=st.none() | st.integers(0, 100),
+            kind=st.sampled_from(["face", "left_hand", "right_hand", "unknown"]),
+            kind_probabilities=st.just(m.KindProbabilities(face=1.0)),
+            centroid_px=st.tuples(finite, finite),
+            bbox_px=st.tuples(finite, finite, st.floats(0, 1000), st.floats(0, 1000)),
+            velocity_px_s=st.tuples(finite, finite),
+            contour=st.binary(max_size=40).map(lambda data: data[: len(data) // 4 * 4]),
+        ),
+        max_size=4,
+    )
+)
+def test_tracks_come_back_as_they_were_sent(tracks):
+    message = m.Tracks.derive(FRAME, m.Producer("tracker", "t"), width=4, height=4, tracks=tracks)
+    assert codec.decode(m.Tracks, codec.encode(message), LABEL) == message
+
+
+@given(st.binary(max_size=200))
+def test_random_bytes_are_refused_or_valid_never_a_crash(payload):
+    try:
+        assert isinstance(codec.decode(m.Tracks, payload, LABEL), m.Tracks)
+    except codec.Malformed as error:
+        assert str(error)
+
+
+@given(st.sampled_from(SAMPLES), st.data())
+def test_a_truncated_message_is_malformed(sample, data):
+    payload = codec.encode(sample)
+    cut = data.draw(st.integers(0, len(payload) - 1))
+    with pytest.raises(codec.Malformed):
+        codec.decode(type(sample), payload[:cut], codec.encoding_of(type(sample)))
+
+
+def test_another_version_is_told_from_another_type():
+    payload = codec.encode(TRACKS)
+    with pytest.raises(codec.WrongVersion, match="version '2'"):
+        codec.decode(m.Tracks, payload, "application/msgpack;Tracks/2")
+    with pytest.raises(codec.WrongType, match="expected 'application/msgpack;Tracks/1'"):
+        codec.decode(m.Tracks, payload, "application/msgpack;Frame/1")
+    with pytest.raises(codec.WrongType):
+        codec.decode(m.Tracks, payload, "zenoh/bytes")
+
+
+def test_unknown_fields_are_ignored():
+    assert codec.decode(m.Tracks, changed(TRACKS, colour="red"), LABEL) == TRACKS
+
+
+@pytest.mark.parametrize(
+    ("message", "fields", "named"),
+    [
+        (TRACKS, {"seq": -1}, "seq"),
+        (TRACKS, {"seq": None}, "seq"),
+        (TRACKS, {"stage": "a/b"}, "stage"),
+        (TRACKS, {"tracks": [{}]}, "tracks.0"),
+        (TRACKS, {"tracks": 3}, "tracks"),
+        (TRACKS, {"width": 100000}, "width"),
+        (FRAME, {"data": b"123"}, "data"),
+        (FRAME, {"encoding": "yuv"}, "encoding"),
+        (m.Poi(poi_id="a", position_m=(0, 0, 0)), {"position_m": [math.nan, 0, 0]}, "position_m.0"),
+        (m.Poi(poi_id="a", position_m=(0, 0, 0)), {"position_m": [math.inf, 0, 0]}, "position_m.0"),
+        (m.Poi(poi_id="a", position_m=(0, 0, 0)), {"position_m": [0, 0]}, "position_m"),
+        (m.Poi(poi_id="a", position_m=(0, 0, 0)), {"poi_id": "a/*"}, "poi_id"),
+    ],
+)
+def test_a_field_out_of_bounds_is_named(message, fields, named):
+    type_ = type(message)
+    with pytest.raises(codec.Malformed, match=named.replace(".", r"\.")):
+        codec.decode(type_, changed(message, **fields), codec.encoding_of(type_))
+
+
+def test_a_pose_that_tracks_needs_its_sigma():
+    with pytest.raises(codec.Malformed, match="yaw_sigma_deg"):
+        codec.validate(m.HeadPose, {"person_id": 0, "status": "tracking", "yaw_deg": 3.0})
+
+
+def test_too_many_bytes_are_refused_before_they_are_read():
+    with pytest.raises(codec.Malformed, match="more than the 100 allowed"):
+        codec.decode(m.Tracks, bytes(101), LABEL, max_bytes=100)
+
+
+def test_derived_messages_cannot_forget_frame_and_producer():
+    derived = m.Gestures.derive(FRAME, m.Producer("gesture", "g-1"), seq=99, stage="else")
+    assert (derived.frame_id, derived.stage, derived.instance) == (FRAME.frame_id, "gesture", "g-1")
