@@ -36,6 +36,8 @@ GAIN_STEPS = 8
 LOOK_AT_ROBOT_SIGMA_DEG = 8.0
 # A side is told wrongly now and then; a zero would make that a total conflict.
 WRONG_SIDE = 0.02
+# Sine of the bearing within which, ahead and behind, left goes over into right.
+SIDE_BORDER = 0.1
 POSSIBILITY_LEVELS = 5
 LEAST_OUT_OF_RANGE = 0.05
 
@@ -144,16 +146,11 @@ def _gesture_likelihood(gesture: PointingGesture, bearing_deg: float, config: Fu
         config.phi_h_max_deg - size, config.phi_h_soft_deg
     )
     row = TABLE_1[gesture]
-    own: Region = "left" if bearing_deg > 0 else "right"
-    return max(WRONG_SIDE, inside * row[own] + (1 - inside) * row["center"] * _same_side(gesture, bearing_deg))
-
-
-def _same_side(gesture: PointingGesture, bearing_deg: float) -> float:
-    """How well a POI in the centre region fits the side of the gesture: table 1 gives both sides .05 on average."""
-    if gesture == "invisible":
-        return 1.0
-    side = math.sin(math.radians(bearing_deg)) * (1 if gesture == "point_left" else -1)
-    return 2 * _rise(side, 0.1)
+    left = _rise(math.sin(math.radians(bearing_deg)), SIDE_BORDER)
+    beside = left * row["left"] + (1 - left) * row["right"]
+    # In the centre table 1 gives both sides .05 on average: more to a POI that lies a little to the side of the gesture.
+    agrees = {"point_left": 2 * left, "point_right": 2 * (1 - left), "invisible": 1.0}[gesture]
+    return max(WRONG_SIDE, inside * beside + (1 - inside) * row["center"] * agrees)
 
 
 def _hand_likelihood(hand: HandObservation, candidate: Candidate, config: FusionConfig) -> float:

@@ -1,0 +1,140 @@
+"""The registry after kill -9, beside a second process, and on files that are no registry."""
+
+from __future__ import annotations
+
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from deixis_fusion.registry import Registry, RegistryError
+from deixis_schemas.messages import Poi
+
+# Edits as fast as it can; says so of each once it is acknowledged.
+WRITER = """
+import sys
+from pathlib import Path
+from deixis_fusion.registry import Registry
+from deixis_schemas.messages import Poi
+
+registry = Registry(Path(sys.argv[1]))
+start = int(sys.argv[2])
+print("ready", flush=True)
+for i in range(start, start + 100_000):
+    registry.put(Poi(poi_id=f"p{i % 40}", name=str(i), position_m=(i, 0, 0)))
+    print("put", i % 40, i, flush=True)
+    if i % 3 == 0:
+        registry.delete(f"p{i % 40}")
+        print("delete", i % 40, i, flush=True)
+"""
+
+
+def poi(poi_id: str, x: float = 0.0) -> Poi:
+    return Poi(poi_id=poi_id, position_m=(x, 0, 0))
+
+
+def kill_a_writer(path: Path, start: int, after: int) -> list[tuple[str, int, int]]:
+    """Start a writer, kill it with SIGKILL after so many acknowledgements; returns all that it acknowledged."""
+    writer = subprocess.Popen([sys.executable, "-c", WRITER, str(path), str(start)], stdout=subprocess.PIPE, text=True)
+    assert writer.stdout is not None
+    assert writer.stdout.readline() == "ready\n"
+    lines = [writer.stdout.readline() for _ in range(after)]
+    writer.send_signal(signal.SIGKILL)
+    rest, _ = writer.communicate(timeout=20)
+    assert writer.returncode == -signal.SIGKILL
+    # What it wrote just before it died; a line cut short was not said.
+    lines += rest[: rest.rfind("\n") + 1].splitlines()
+    return [(kind, int(slot), int(number)) for kind, slot, number in (line.split() for line in lines)]
+
+
+def test_no_acknowledged_edit_is_lost_by_kill_9(tmp_path: Path) -> None:
+    path, chance = tmp_path / "pois.sqlite", random.Random(1)
+    known: dict[int, int] = {}
+    start = 0
+    for _ in range(6):
+        for kind, slot, number in kill_a_writer(path, start, chance.randint(5, 60)):
+            known.pop(slot, None)
+            if kind == "put":
+                known[slot] = number
+            start = number + 1
+        registry = Registry(path)
+        stored = {int(p.poi_id[1:]): int(p.name) for p in registry.pois()}
+        registry.close()
+        # Killed between commit and acknowledgement, it is ahead of what it said: by one edit, never behind.
+        ahead = [slot for slot in set(stored) | set(known) if stored.get(slot) != known.get(slot)]
+        assert len(ahead) <= 1
+        assert all(slot in ((start - 1) % 40, start % 40) for slot in ahead)
+        assert all(stored.get(slot, start) >= known.get(slot, 0) for slot in ahead)
+        known = stored
+
+
+def test_a_second_registry_on_the_same_file_is_refused_soon_and_clearly(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    first = Registry(path)
+    began = time.monotonic()
+    with pytest.raises(RegistryError, match=r"pois\.sqlite: is locked by another process"):
+        Registry(path)
+    assert time.monotonic() - began < 5
+    first.put(poi("a"))
+    first.close()
+    assert [p.poi_id for p in Registry(path).pois()] == ["a"]
+
+
+def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    path.write_bytes(b"this is no database, " * 100)
+    with pytest.raises(RegistryError, match=r"pois\.sqlite: is corrupt"):
+        Registry(path)
+    assert path.read_bytes().startswith(b"this is no database")
+
+
+def test_a_damaged_database_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    registry = Registry(path)
+    for i in range(300):
+        registry.put(poi(f"p{i}"))
+    registry.close()
+    content = bytearray(path.read_bytes())
+    content[4096:] = bytes(len(content) - 4096)
+    path.write_bytes(content)
+    with pytest.raises(RegistryError, match="is corrupt"):
+        Registry(path)
+
+
+def test_an_entry_that_breaks_the_contract_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    Registry(path).close()
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("INSERT INTO pois VALUES ('vase', '{\"poi_id\": \"vase\"}')")
+    with pytest.raises(RegistryError, match="the entry 'vase' is corrupt: position_m"):
+        Registry(path)
+
+
+def test_another_programs_database_is_not_touched(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.sqlite"
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("CREATE TABLE recipes (name TEXT)")
+    with pytest.raises(RegistryError, match="something else"):
+        Registry(path)
+
+
+def test_a_newer_format_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    Registry(path).close()
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("PRAGMA user_version = 7")
+    with pytest.raises(RegistryError, match="has format 7"):
+        Registry(path)
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RegistryError, match="cannot be opened"):
+        Registry(tmp_path / "file" / "pois.sqlite")
+    with pytest.raises(RegistryError, match="registry"):
+        Registry(tmp_path)

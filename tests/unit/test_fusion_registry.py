@@ -1,0 +1,237 @@
+"""The POI registry, the site file's baseline, and edits as they come over the keys."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+from deixis_fusion.edits import EditError, matches, poi_id_of, read_poi
+from deixis_fusion.poi_edits import PoiEdits
+from deixis_fusion.registry import Registry, RegistryError
+from deixis_fusion.registry_path import default_registry_path
+from deixis_runtime.queries import Edit, Query, Refused
+from deixis_runtime.site import SitePoi
+from deixis_schemas.codec import encode, encoding_of
+from deixis_schemas.messages import MAX_POIS, Poi
+
+KEY = "deixis/r1/fusion/poi/vase"
+POI_LABEL = encoding_of(Poi)
+
+
+def poi(poi_id: str, x: float = 0.0) -> Poi:
+    return Poi(poi_id=poi_id, position_m=(x, 0, 0))
+
+
+def site(**places: float) -> list[Poi]:
+    return [SitePoi(poi_id=poi_id, position_m=(x, 0, 0)) for poi_id, x in places.items()]
+
+
+def places(registry: Registry) -> dict[str, float]:
+    return {p.poi_id: p.position_m[0] for p in registry.pois()}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "state" / "pois.sqlite"
+
+
+def test_what_was_put_is_there_when_the_file_is_opened_again(path: Path) -> None:
+    registry = Registry(path)
+    registry.put(Poi(poi_id="vase", name="Vase", position_m=(1, 2, 3), extent_m=0.3, tags=["blue"]))
+    registry.put(poi("door"))
+    registry.delete("door")
+    before = registry.pois()
+    registry.close()
+    assert Registry(path).pois() == before
+
+
+def test_deleting_what_is_not_there_is_refused(path: Path) -> None:
+    with pytest.raises(RegistryError, match="poi_id: there is no POI 'ghost'"):
+        Registry(path).delete("ghost")
+
+
+def test_a_full_registry_refuses_one_more_and_still_takes_changes(path: Path) -> None:
+    registry = Registry(path)
+    registry.apply_site([poi(f"p{i}") for i in range(MAX_POIS)])
+    with pytest.raises(RegistryError, match="full"):
+        registry.put(poi("more"))
+    registry.put(poi("p0", 5))
+    assert places(registry)["p0"] == 5
+
+
+def test_only_what_changed_in_the_site_file_is_applied_and_operators_edits_persist(path: Path) -> None:
+    registry = Registry(path)
+    assert registry.apply_site(site(a=1, b=2, c=3, d=4)) == ["a", "b", "c", "d"]
+    registry.put(poi("a", 10))
+    registry.put(poi("mine", 7))
+    registry.delete("d")
+    registry.close()
+    registry = Registry(path)
+    assert registry.apply_site(site(a=1, b=20, e=5, d=4)) == ["b", "c", "e"]
+    # a: moved by the operator; b: changed in the file; c: gone from it; d: deleted by the operator; e: new in it.
+    assert places(registry) == {"a": 10, "b": 20, "e": 5, "mine": 7}
+
+
+def test_the_same_site_file_changes_nothing(path: Path) -> None:
+    registry = Registry(path)
+    registry.apply_site(site(a=1))
+    registry.delete("a")
+    assert registry.apply_site(site(a=1)) == []
+    assert places(registry) == {}
+
+
+def test_a_failed_write_leaves_memory_as_the_disk_is(path: Path) -> None:
+    registry = Registry(path)
+    registry.put(poi("a"))
+    registry._db.execute("PRAGMA query_only = ON")
+    with pytest.raises(RegistryError, match="not written"):
+        registry.put(poi("b"))
+    with pytest.raises(RegistryError, match="not written"):
+        registry.delete("a")
+    assert places(registry) == {"a": 0}
+
+
+def test_the_default_file_depends_on_robot_and_site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    one = default_registry_path("r1", Path("sites/lab.yaml"))
+    assert one.parent == tmp_path / "deixis" / "r1"
+    assert one.name.startswith("lab-")
+    assert len({one, default_registry_path("r2", Path("sites/lab.yaml")), default_registry_path("r1", Path("lab.yaml"))}) == 3
+    assert one == default_registry_path("r1", Path("sites/../sites/lab.yaml"))
+
+
+# --- edits ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("label", ["application/json", "", "zenoh/bytes", "zenoh/string", "text/json"])
+def test_a_poi_is_read_from_json_as_generic_clients_send_it(label: str) -> None:
+    assert read_poi(KEY, b'{"position_m": [1, 2, 3]}', label) == Poi(poi_id="vase", position_m=(1, 2, 3))
+
+
+def test_a_poi_is_read_from_msgpack() -> None:
+    wanted = Poi(poi_id="vase", position_m=(1, 2, 3), tags=["x"])
+    assert read_poi(KEY, encode(wanted), POI_LABEL) == wanted
+
+
+@pytest.mark.parametrize(
+    ("payload", "label", "complaint"),
+    [
+        (b'{"position_m": [1, 2]}', "", r"^position_m"),
+        (b'{"position_m": ["east", 2, 3]}', "", r"^position_m\.0"),
+        (b'{"position_m": [NaN, 2, 3]}', "", r"^position_m\.0"),
+        (b'{"position_m": [1e999, 2, 3]}', "", r"^position_m\.0"),
+        (b'{"position_m": [1, 2, 3], "extent_m": -1}', "", r"^extent_m"),
+        (b'{"position_m": [1, 2, 3], "poi_id": "door"}', "", r"^poi_id: 'door', but the key ends in 'vase'"),
+        (b"{}", "", r"^position_m"),
+        (b"[1, 2, 3]", "", r"^payload: not an object"),
+        (b"\xff\xfe garbage", "", r"^payload: not JSON"),
+        (b"[" * 100_000, "", r"^payload"),
+        (b"", "", r"^payload: not JSON"),
+        (b"\xc1 garbage", POI_LABEL, "not msgpack"),
+        (b"{}", "application/msgpack;Poi/9", "^encoding: Poi version '9'"),
+        (b"{}", "application/msgpack;Frame/1", "^encoding: 'Frame/1'"),
+        (b"{}", "image/png", "^encoding: 'image/png'"),
+    ],
+)
+def test_a_malformed_poi_is_refused_with_the_fields_name(payload: bytes, label: str, complaint: str) -> None:
+    with pytest.raises(EditError, match=complaint):
+        read_poi(KEY, payload, label)
+
+
+@pytest.mark.parametrize(
+    "key", ["deixis/r1/fusion/poi/*", "deixis/r1/fusion/poi/**", "deixis/r1/fusion/poi/", "fusion/state", "a/$*"]
+)
+def test_an_edit_needs_the_key_of_one_poi(key: str) -> None:
+    with pytest.raises(EditError, match="key: "):
+        poi_id_of(key)
+
+
+@pytest.mark.parametrize("key", ["deixis/r1/fusion/poi/two words", "deixis/r1/fusion/poi/" + "x" * 65])
+def test_an_id_that_the_contract_refuses_is_refused(key: str) -> None:
+    with pytest.raises(EditError, match=r"^poi_id"):
+        read_poi(key, b'{"position_m": [1, 2, 3]}', "")
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (KEY, True), ("deixis/r1/fusion/poi/*", True), ("deixis/r1/fusion/poi/**", True), ("deixis/**", True), ("**", True),
+        ("deixis/*/fusion/poi/vase", True), ("deixis/**/vase", True), ("**/poi/*", True), ("deixis/r1/fusion/poi/v$*", True),
+        ("deixis/r1/fusion/poi/$*as$*", True), ("deixis/r1/fusion/poi/v$*x", False), ("deixis/r1/fusion/poi/vas$*sse", False),
+        ("deixis/r1/fusion/poi", False), ("deixis/r1/fusion/*", False), ("deixis/r2/**", False),
+    ],
+)  # fmt: skip
+def test_key_expressions_match_as_zenohs_do(expression: str, expected: bool) -> None:
+    import zenoh
+
+    assert matches(expression, KEY) is expected
+    assert bool(zenoh.KeyExpr(expression).intersects(zenoh.KeyExpr(KEY))) is expected
+
+
+@pytest.fixture
+def edits(path: Path) -> PoiEdits:
+    registry = Registry(path)
+    registry.apply_site(site(vase=1, door=2))
+    return PoiEdits(registry, "deixis/r1/fusion/poi/")
+
+
+def query(key: str = KEY, payload: dict[str, Any] | None = None, **parameters: str) -> Query:
+    return Query(key, parameters, json.dumps(payload).encode() if payload is not None else None, "application/json")
+
+
+def test_a_get_answers_each_matching_poi_under_its_own_key(edits: PoiEdits) -> None:
+    replies = edits.answer(query("deixis/r1/fusion/poi/**"), 0)
+    assert [key for key, _ in replies] == ["deixis/r1/fusion/poi/door", KEY]
+    assert [key for key, _ in edits.answer(query(KEY), 0)] == [KEY]
+    assert edits.answer(query("deixis/r1/fusion/poi/ghost"), 0) == []
+
+
+def test_an_acknowledged_edit_is_answered_with_what_is_on_disk(edits: PoiEdits, path: Path) -> None:
+    ((key, stored),) = edits.answer(query(payload={"position_m": [9, 8, 7]}), 0)
+    assert (key, stored) == (KEY, Poi(poi_id="vase", position_m=(9, 8, 7)))
+    ((_, deleted),) = edits.answer(query("deixis/r1/fusion/poi/door", op="delete"), 0)
+    assert isinstance(deleted, Poi)
+    assert deleted.poi_id == "door"
+    edits._registry.close()
+    assert places(Registry(path)) == {"vase": 9}
+    assert edits.accepted == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [
+        (query(payload={"position_m": [1, 2, "x"]}), r"^position_m\.2"),
+        (query(op="put"), "^payload"),
+        (query("deixis/r1/fusion/poi/ghost", op="delete"), "^poi_id: there is no POI 'ghost'"),
+        (query("deixis/r1/fusion/poi/*", op="delete"), "^key"),
+    ],
+)
+def test_a_refused_edit_names_the_field_and_is_counted(edits: PoiEdits, asked: Query, complaint: str) -> None:
+    with pytest.raises(Refused, match=complaint):
+        edits.answer(asked, 5)
+    assert (edits.accepted, edits.rejected) == (0, 1)
+    assert (edits.rejections[0].key, edits.rejections[0].stamp_ns) == (asked.key, 5)
+
+
+def test_an_operation_that_is_not_known_is_refused(edits: PoiEdits) -> None:
+    with pytest.raises(Refused, match=r"^op: 'drop'"):
+        edits.answer(query(op="drop"), 0)
+
+
+def test_edits_without_an_answer_do_the_same_and_their_refusal_is_kept(edits: PoiEdits) -> None:
+    assert edits.take(Edit(KEY, "put", msgpack.packb({"position_m": [3, 3, 3]}), POI_LABEL), 0) is None
+    assert edits.take(Edit(KEY, "delete", b"", ""), 0) is None
+    refused = edits.take(Edit(KEY, "delete", b"", ""), 7)
+    assert refused == "poi_id: there is no POI 'vase'"
+    assert (edits.accepted, edits.rejected) == (2, 1)
+    assert edits.rejections[-1].reason == refused
+
+
+def test_only_the_last_refusals_are_kept(edits: PoiEdits) -> None:
+    for i in range(100):
+        edits.take(Edit(f"deixis/r1/fusion/poi/g{i}", "delete", b"", ""), i)
+    assert (edits.rejected, len(edits.rejections)) == (100, 16)
+    assert edits.rejections[-1].key.endswith("g99")
