@@ -3,14 +3,41 @@ PYTHON ?= python3.11
 SOURCE ?=
 BIN := .venv/bin
 DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation
-EDITABLE := $(foreach d,$(DISTRIBUTIONS),-e $(d))
+PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench clean
+.PHONY: setup demo test check bench contract clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
-	@command -v $(PYTHON) >/dev/null || { echo "make: Deixis needs Python 3.11; '$(PYTHON)' is not there (set PYTHON=...)" >&2; exit 1; }
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt hatchling editables
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-build-isolation -r requirements-dev.txt $(EDITABLE)
+	@command -v $(PYTHON) >/dev/null || { echo "make: Deixis needs Python 3.11, and '$(PYTHON)' is not there (make PYTHON=...)" >&2; exit 1; }
+	@echo "setting up .venv (about a minute) ..."
+	@$(PYTHON) -m venv .venv
+	@$(PIP) hatchling editables
+	@$(PIP) --no-build-isolation -r requirements-dev.txt $(foreach d,$(DISTRIBUTIONS),-e $(d))
 	@touch $@
+
+# The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]
+demo: setup
+ifeq ($(SOURCE),)
+	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
+		--registry $$registry --expect P3; status=$$?; rm -f $$registry*; exit $$status
+else
+	@$(BIN)/deixis run $(SOURCE) $(if $(SITE),--site $(SITE))
+endif
+
+test: setup check
+	@$(BIN)/pytest
+
+check: setup
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
+
+bench: setup
+	@$(BIN)/python bench/pipeline.py
+
+# After a change of messages or topics: JSON Schema, golden bytes and the topic table
+contract: setup
+	@$(BIN)/python -m deixis_schemas.export schemas/contract
+
+clean:
+	rm -rf .venv build dist

@@ -1,5 +1,6 @@
 """The codec refuses what it must and gives back what it got."""
 
+import contextlib
 import math
 
 import msgpack
@@ -42,10 +43,8 @@ def test_tracks_come_back_as_they_were_sent(tracks):
 
 @given(st.binary(max_size=200))
 def test_random_bytes_are_refused_or_valid_never_a_crash(payload):
-    try:
+    with contextlib.suppress(codec.Malformed):
         assert isinstance(codec.decode(m.Tracks, payload, LABEL), m.Tracks)
-    except codec.Malformed as error:
-        assert str(error)
 
 
 @given(st.sampled_from(SAMPLES), st.data())

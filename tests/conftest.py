@@ -1,0 +1,62 @@
+"""Shared by all tests: where the labelled data lie, free ports, waiting for conditions."""
+
+import socket
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SHARED = ROOT.parent / "shared"
+
+
+@pytest.fixture(scope="session")
+def rendered():
+    """Folder of the labelled clips; not at a user's."""
+    folder = SHARED / "data" / "rendered"
+    if not folder.is_dir():
+        pytest.skip("the labelled clips (../shared/data/rendered) are not on this machine")
+    return folder
+
+
+@pytest.fixture
+def example_clip():
+    """The clip that ships with the project."""
+    return ROOT / "examples" / "pointing.mp4"
+
+
+@pytest.fixture
+def example_site():
+    """The site of the clip that ships with the project."""
+    return ROOT / "examples" / "pointing.yaml"
+
+
+@pytest.fixture
+def robot():
+    """A robot name of this test's own: tests must never hear each other."""
+    return f"test-{uuid.uuid4().hex[:8]}"
+
+
+@pytest.fixture
+def free_port():
+    """A TCP port on loopback that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def wait_for():
+    """Wait for a condition: `wait_for(lambda: x, 'what is awaited')` returns its first true value or fails the test."""
+
+    def wait(condition, what, timeout_s=20.0):
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            value = condition()
+            if value:
+                return value
+            time.sleep(0.02)
+        pytest.fail(f"not within {timeout_s:.0f} s: {what}")
+
+    return wait
