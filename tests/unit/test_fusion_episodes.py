@@ -110,7 +110,7 @@ def test_evidence_is_bounded_however_long_the_hand_is_held() -> None:
     for frame in range(3000):
         tracker.observe(Sample(stamp(frame), gesture(), None))
     assert tracker.stroke is not None
-    assert len(tracker.stroke.samples) <= CONFIG.max_episode_s * FPS + 2
+    assert len(tracker.stroke.samples) <= CONFIG.max_evidence_s * FPS + 2
 
 
 # --- evidence of a stroke ---------------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ def test_the_head_on_its_way_and_outliers_hardly_count() -> None:
 
 
 def test_a_head_mostly_out_of_range_is_out_of_range_to_its_side() -> None:
-    heads: list[HeadPose | None] = [pose(90)] * 8 + [pose(None, "out_of_range", side="left")] * 20
+    heads = [pose(90)] * 8 + [pose(None, "out_of_range", side="left")] * 20
     head = head_over(samples([gesture()] * 28, heads), 0.2)
     assert head is not None
     assert (head.yaw_deg, head.side) == (None, "left")

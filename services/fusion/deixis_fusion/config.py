@@ -77,7 +77,7 @@ class FusionConfig(BaseModel):
     max_evidence_age_s: float = Field(
         default=0.5, gt=0, le=10, description="A late stage still counts in a stroke for so long."
     )
-    max_episode_s: float = Field(default=20, gt=0, le=600, description="Evidence older than this is forgotten.")
+    max_evidence_s: float = Field(default=5, gt=0, le=600, description="Of a long stroke the last seconds count.")
 
     # answer
     tie_margin: float = Field(default=0.1, ge=0, le=1, description="deixis: pignistic differences below this are ties.")

@@ -6,6 +6,7 @@ withdrawn, the person is lost or the source ends.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 from .config import FusionConfig
@@ -21,6 +22,7 @@ class Stroke:
     episode_id: str = ""
     samples: list[Sample] = field(default_factory=list)
     not_pointing: int = 0
+    sides: Counter[str] = field(default_factory=Counter)
 
     @property
     def is_open(self) -> bool:
@@ -88,7 +90,8 @@ class EpisodeTracker:
             self.stroke = Stroke(sample.stamp_ns, sample.stamp_ns)
         self.stroke.last_pointing_ns = sample.stamp_ns
         self.stroke.samples.append(sample)
-        oldest_ns = sample.stamp_ns - self._config.max_episode_s * 1e9
+        self.stroke.sides[sample.pointing or ""] += 1
+        oldest_ns = sample.stamp_ns - self._config.max_evidence_s * 1e9
         if self.stroke.samples[0].stamp_ns < oldest_ns:
             self.stroke.samples = [kept for kept in self.stroke.samples if kept.stamp_ns >= oldest_ns]
 
@@ -108,5 +111,4 @@ def _opposes(sample: Sample, stroke: Stroke) -> bool:
     if sample.pointing not in ("point_left", "point_right"):
         return False
     other = "point_right" if sample.pointing == "point_left" else "point_left"
-    own = sum(1 for old in stroke.samples if old.pointing == sample.pointing)
-    return sum(1 for old in stroke.samples if old.pointing == other) > own
+    return stroke.sides[other] > stroke.sides[sample.pointing]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 from deixis_schemas.messages import Gesture, HeadPose, Side
@@ -35,7 +36,7 @@ class Sample:
     gesture: Gesture | None
     pose: HeadPose | None
 
-    @property
+    @cached_property
     def pointing(self) -> PointingGesture | None:
         """The pointing gesture of a stroke; none in other phases and for other gestures."""
         if self.gesture is None or self.gesture.phase != "stroke":
