@@ -1,0 +1,104 @@
+"""One arm of a person: the blob of its hand over time."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections import deque
+
+from deixis_schemas.messages import GestureKind, Phase, Side, Track
+
+from .config import GestureConfig
+from .fingertips import Finger, find_fingers
+from .hand import CHEST, Face, HandShape, cut_hand, unpack_contour
+from .phases import PhaseTracker
+from .rules import StrokeGesture, vote
+
+# Weight of a new frame in the average of which side's hand it is.
+SIDE_RATE = 0.15
+# Frames of a stroke that offset and finger length are the medians of.
+KEEP_MEASURES = 15
+# The outline is worth its cost only near a stroke: hands lower than this below the face are at rest.
+LOW = 3.6
+
+
+class Arm:
+    """Phase, gesture and shape of one hand. `resting_until_s`: a hand found raised before then may rest there."""
+
+    def __init__(self, config: GestureConfig, resting_until_s: float) -> None:
+        self._config = config
+        self._phases = PhaseTracker(config)
+        self._stroke = StrokeGesture(config.settle_s)
+        self._resting_until_s = resting_until_s
+        self._first_s: float | None = None
+        self._leftness = 0.0
+        self._measures: deque[tuple[float, float]] = deque(maxlen=KEEP_MEASURES)
+        self._place_px = (0.0, 0.0)
+        self.track_id = -1
+        self.seen_s = -math.inf
+        self.fingers: list[Finger] = []
+        self.stretch = 0.0
+
+    @property
+    def phase(self) -> Phase:
+        """Phase of the hand."""
+        return self._phases.phase
+
+    @property
+    def gesture(self) -> GestureKind:
+        """Gesture of the stroke that the hand is in; `none` before it is decided and outside of strokes."""
+        return self._stroke.gesture
+
+    @property
+    def side(self) -> Side | None:
+        """The person's own side of the hand, by its tracks' kinds; None where they never said."""
+        if self._leftness == 0.0:
+            return None
+        return "left" if self._leftness > 0 else "right"
+
+    @property
+    def measured(self) -> tuple[float, float] | None:
+        """Offset of the tip beside the face and visible length of the finger, face widths: medians of the stroke so far."""
+        if not self._measures:
+            return None
+        return statistics.median(m[0] for m in self._measures), statistics.median(m[1] for m in self._measures)
+
+    def distance_px(self, track: Track) -> float:
+        """How far a track is from where this hand was seen last, pixels."""
+        return math.dist(self._place_px, track.centroid_px)
+
+    def update(self, track: Track, face: Face, time_s: float, walking: bool) -> None:
+        """Advance by an observed blob of this hand."""
+        self.track_id, self.seen_s, self._place_px = track.track_id, time_s, track.centroid_px
+        self._first_s = time_s if self._first_s is None else self._first_s
+        self._weigh_side(track)
+        hand = self._shape(track, face)
+        place = hand.centroid if hand else _about(face, track.centroid_px)
+        self.stretch = math.dist(place, CHEST)
+        in_image = (place[0] + face.x_px / face.width_px, place[1] + face.y_px / face.width_px)
+        phase = self._phases.update(time_s, in_image, place, walking)
+        self.fingers = find_fingers(hand) if hand and phase != "idle" else []
+        if phase != "stroke":
+            self._stroke = StrokeGesture(self._config.settle_s)
+            self._measures.clear()
+        elif hand:
+            self._stroke.add(time_s, vote(hand, self.fingers), self._was_raised_before_us())
+            self._measures.append((hand.tip[0], self.fingers[0].length if self.fingers else 0.0))
+
+    def _was_raised_before_us(self) -> bool:
+        """The hand was seen rising, or came into sight later than the person did."""
+        return self._phases.rose or (self._first_s is not None and self._first_s > self._resting_until_s)
+
+    def _weigh_side(self, track: Track) -> None:
+        if track.kind in ("left_hand", "right_hand"):
+            sense = 1.0 if track.kind == "left_hand" else -1.0
+            self._leftness += SIDE_RATE * (sense - self._leftness)
+
+    def _shape(self, track: Track, face: Face) -> HandShape | None:
+        if (track.bbox_px[1] - face.y_px) / face.width_px > LOW:
+            return None
+        return cut_hand(face.normalised(unpack_contour(track.contour)))
+
+
+def _about(face: Face, point_px: tuple[float, float]) -> tuple[float, float]:
+    return (point_px[0] - face.x_px) / face.width_px, (point_px[1] - face.y_px) / face.width_px

@@ -1,0 +1,37 @@
+"""Settings of the gesture stage. Lengths are in face widths (fw), times in seconds: free of scale and frame rate."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class GestureConfig(BaseModel):
+    """When a hand gestures, and when a gesture is a pointing."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    still_speed: float = Field(
+        default=1.3, gt=0, le=20, description="A hand slower than this is still, fw/s (0.045 fw a frame at 30 frames/s)."
+    )
+    moving_speed: float = Field(
+        default=1.7, gt=0, le=40, description="A still hand that becomes faster than this leaves, fw/s."
+    )
+    speed_window_s: float = Field(default=0.1, gt=0, le=1, description="Time over which speed is measured.")
+    raised_below_face: float = Field(
+        default=2.3, ge=0, le=6, description="A hand higher than this below the face is raised, fw."
+    )
+    raised_beside_below_face: float = Field(
+        default=3.2, ge=0, le=6, description="The same for a hand held away from the body: a forearm's pointing is lower, fw."
+    )
+    beside_body: float = Field(
+        default=2.3, ge=0, le=6, description="Sideways from the face's centre, a hand is off the body, fw."
+    )
+    settle_s: float = Field(default=0.2, ge=0, le=2, description="A stroke lasts this long before its gesture is said.")
+    forget_s: float = Field(default=0.4, gt=0, le=5, description="A hand or a face unseen for longer is forgotten.")
+    walking_speed: float = Field(default=2.0, gt=0, le=40, description="A person whose face is faster than this walks, fw/s.")
+    focal_length_widths: float = Field(
+        default=0.875,
+        ge=0.2,
+        le=10,
+        description="Focal length in image widths, for the perspective of an arm toward the camera (0.875: 60 degrees wide).",
+    )

@@ -1,0 +1,131 @@
+"""One person: the face that gives scale and origin, and the hands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from deixis_schemas.messages import Gesture, Side, Track
+
+from .arm import Arm
+from .bearing import Bearing, estimate_bearing
+from .config import GestureConfig
+from .hand import Face
+
+# The face's box jitters and, with a turning head, changes its width; distance to a person changes slowly.
+WIDTH_TIME_S = 0.7
+PLACE_TIME_S = 0.12
+LEAST_FACE_PX = 6.0
+# A hand that comes back within this of where one was lost is the same hand, face widths.
+SAME_HAND = 1.2
+# A person seen for less than this may stand with resting hands raised: nobody saw them being raised.
+FIRST_LOOK_S = 0.7
+POINTING = ("point_left", "point_right", "invisible")
+RANK = {"stroke": 3, "preparation": 2, "retraction": 1, "idle": 0}
+
+
+class Person:
+    """Follows the face and the hands of one person and says which hand gestures."""
+
+    def __init__(self, person_id: int, config: GestureConfig) -> None:
+        self._person_id = person_id
+        self._config = config
+        self._face: Face | None = None
+        self._face_speed = 0.0
+        self._face_s = -math.inf
+        self._first_s: float | None = None
+        self._arms: list[Arm] = []
+        self._current: Arm | None = None
+
+    def is_gone(self, time_s: float) -> bool:
+        """The face has been missing for too long."""
+        return time_s - self._face_s > self._config.forget_s
+
+    def update(self, tracks: Sequence[Track], width: int, time_s: float) -> Gesture | None:
+        """Gesture of the person in a frame `width` pixels wide; None without a usable face."""
+        self._first_s = time_s if self._first_s is None else self._first_s
+        self._follow_face(tracks, time_s)
+        if self._face is None:
+            return None
+        walking = self._face_speed > self._config.walking_speed
+        for arm, track in self._assigned([t for t in tracks if t.kind != "face" and t.observed and t.contour]):
+            arm.update(track, self._face, time_s, walking)
+        self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
+        self._current = self._gesturing()
+        return self._spoken(self._current, width)
+
+    def _follow_face(self, tracks: Sequence[Track], time_s: float) -> None:
+        seen = [t for t in tracks if t.kind == "face" and t.bbox_px[2] >= LEAST_FACE_PX]
+        if not seen:
+            return
+        x, y, w, h = max(seen, key=lambda t: (t.observed, t.confidence)).bbox_px
+        now = Face(x + w / 2, y + h / 2, w)
+        old, passed = self._face, time_s - self._face_s
+        self._face_s = time_s
+        if old is None or passed <= 0 or passed > self._config.forget_s:
+            self._face = now
+            return
+        place, scale = 1 - math.exp(-passed / PLACE_TIME_S), 1 - math.exp(-passed / WIDTH_TIME_S)
+        self._face = Face(
+            old.x_px + place * (now.x_px - old.x_px),
+            old.y_px + place * (now.y_px - old.y_px),
+            old.width_px + scale * (now.width_px - old.width_px),
+        )
+        speed = abs(self._face.x_px - old.x_px) / passed / self._face.width_px
+        self._face_speed += place * (speed - self._face_speed)
+
+    def _assigned(self, hands: Sequence[Track]) -> list[tuple[Arm, Track]]:
+        """Each hand with its arm: by the track's id, else the arm lost nearby, else a new one."""
+        assert self._face is not None
+        by_id = {arm.track_id: arm for arm in self._arms}
+        pairs = [(by_id[t.track_id], t) for t in hands if t.track_id in by_id]
+        free = [arm for arm in self._arms if all(arm is not taken for taken, _ in pairs)]
+        for track in hands:
+            if track.track_id in by_id:
+                continue
+            near = [arm for arm in free if arm.distance_px(track) <= SAME_HAND * self._face.width_px]
+            if near:
+                arm = min(near, key=lambda a: a.distance_px(track))
+                free.remove(arm)
+            else:
+                arm = Arm(self._config, self._resting_until())
+                self._arms.append(arm)
+            pairs.append((arm, track))
+        return pairs
+
+    def _resting_until(self) -> float:
+        assert self._first_s is not None
+        return self._first_s + FIRST_LOOK_S
+
+    def _gesturing(self) -> Arm | None:
+        """The hand to speak of: a stroke before a motion, a pointing before other strokes; the one so far among equals."""
+        return max(
+            self._arms,
+            key=lambda arm: (RANK[arm.phase], arm.gesture in POINTING, arm is self._current, arm.stretch),
+            default=None,
+        )
+
+    def _spoken(self, arm: Arm | None, width: int) -> Gesture:
+        if arm is None or arm.phase == "idle" or self._face is None:
+            return Gesture(person_id=self._person_id, phase="idle", gesture="none")
+        gesture = arm.gesture if arm.phase == "stroke" else "none"
+        bearing = self._bearing(arm, width) if gesture in POINTING else None
+        return Gesture(
+            person_id=self._person_id,
+            phase=arm.phase,
+            gesture=gesture,
+            hand=arm.side,
+            fingertips_px=[self._face.pixels(finger.tip) for finger in arm.fingers[:5]],
+            bearing_deg=bearing.deg if bearing else None,
+            bearing_sigma_deg=bearing.sigma_deg if bearing else None,
+            bearing_mirrored=bearing.mirrored if bearing else False,
+        )
+
+    def _bearing(self, arm: Arm, width: int) -> Bearing | None:
+        measured = arm.measured
+        if measured is None or self._face is None:
+            return None
+        offset, finger = measured
+        distance = self._config.focal_length_widths * width / self._face.width_px
+        own_side: Side = "left" if offset > 0 else "right"
+        return estimate_bearing(offset, finger, distance, across=arm.side is not None and own_side != arm.side)

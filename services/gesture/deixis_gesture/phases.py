@@ -1,0 +1,94 @@
+"""Phases of a gesture from the motion of the hand: preparation, stroke, retraction (paper section 4, [13]).
+
+A stroke is a raised hand that is nearly motionless; preparation leads up to it and retraction back to rest. Speeds are in
+face widths per second and measured over time, not frames, so that neither distance nor rate nor dropped frames matter.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+from itertools import combinations
+
+from deixis_schemas.messages import Phase
+
+from .config import GestureConfig
+
+# Slope between two samples closer than this is mostly noise.
+LEAST_SPAN_S = 0.02
+# Upward and downward speeds that tell a hand on its way from a hand at rest, face widths per second.
+RISING_SPEED = 0.6
+RESTING_SPEED = 0.7
+KEEP_SAMPLES = 64
+
+
+class Motion:
+    """Velocity of a point by the median of its slopes (Theil-Sen), which one stray sample does not move."""
+
+    def __init__(self, window_s: float) -> None:
+        self._window_s = window_s
+        self._samples: deque[tuple[float, float, float]] = deque(maxlen=KEEP_SAMPLES)
+
+    def add(self, time_s: float, point: tuple[float, float]) -> None:
+        """A sample; times must rise. Older samples leave the window, but one before it stays for slow cameras."""
+        self._samples.append((time_s, *point))
+        while len(self._samples) > 2 and time_s - self._samples[1][0] >= self._window_s:
+            self._samples.popleft()
+
+    @property
+    def velocity(self) -> tuple[float, float] | None:
+        """(vx, vy) per second, y down; None before there are two samples."""
+        slopes = [
+            ((b[1] - a[1]) / (b[0] - a[0]), (b[2] - a[2]) / (b[0] - a[0]))
+            for a, b in combinations(self._samples, 2)
+            if b[0] - a[0] >= LEAST_SPAN_S
+        ]
+        if not slopes:
+            return None
+        return statistics.median(s[0] for s in slopes), statistics.median(s[1] for s in slopes)
+
+
+class PhaseTracker:
+    """Phase of one hand."""
+
+    def __init__(self, config: GestureConfig) -> None:
+        self._config = config
+        self._motion = Motion(config.speed_window_s)
+        self.phase: Phase = "idle"
+        self.rose = False
+        self.raised = False
+
+    def update(self, time_s: float, point: tuple[float, float], place: tuple[float, float], walking: bool) -> Phase:
+        """Advance to `time_s`: hand at `point` (face widths, fixed to the image), at `place` about the face's centre."""
+        self._motion.add(time_s, point)
+        velocity = self._motion.velocity
+        if velocity is None:
+            return self.phase
+        self.raised = self._is_raised(place)
+        following = "idle" if walking and self.phase != "stroke" else self._following(*velocity)
+        if following != self.phase:
+            self.rose = self.rose or following == "preparation"
+        if following == "idle":
+            self.rose = False
+        self.phase = following
+        return following
+
+    def _is_raised(self, place: tuple[float, float]) -> bool:
+        """Higher than a resting hand; once raised a hand may sink a little before it counts as lowered."""
+        slack = 0.25 if self.raised else 0.0
+        beside = abs(place[0]) >= self._config.beside_body - slack
+        limit = self._config.raised_beside_below_face if beside else self._config.raised_below_face
+        return place[1] <= limit + slack
+
+    def _following(self, vx: float, vy: float) -> Phase:
+        speed = (vx * vx + vy * vy) ** 0.5
+        still = speed < (self._config.moving_speed if self.phase == "stroke" else self._config.still_speed)
+        if self.raised and still:
+            return "stroke"
+        if vy < -RISING_SPEED:
+            return "preparation"
+        if self.phase in ("stroke", "retraction"):
+            return "idle" if not self.raised and speed < RESTING_SPEED else "retraction"
+        if self.phase == "preparation" and (self.raised or speed >= RESTING_SPEED):
+            return "preparation" if self.raised or vy < RISING_SPEED else "retraction"
+        return "preparation" if self.raised else "idle"

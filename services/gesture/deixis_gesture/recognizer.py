@@ -1,0 +1,46 @@
+"""The core of the gesture stage: tracks of a frame -> gestures, one for each person with a face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from deixis_schemas.messages import Gesture, Track
+
+from .config import GestureConfig
+from .person import Person
+
+
+class GestureRecognizer:
+    """Follows the hands of every person. Pure: the same tracks at the same times give the same gestures."""
+
+    def __init__(self, config: GestureConfig) -> None:
+        self._config = config
+        self._persons: dict[int, Person] = {}
+        self._last_ns: int | None = None
+
+    def update(self, tracks: Sequence[Track], width: int, height: int, stamp_ns: int) -> list[Gesture]:
+        """Gestures of the frame of size `width` x `height` taken at `stamp_ns`, in the order of `person_id`.
+
+        Time that runs backwards (a restarted camera, a looped clip) starts anew. Raises ValueError for an empty frame.
+        """
+        if width <= 0 or height <= 0:
+            raise ValueError(f"width, height: {width} x {height}, must be positive")
+        if self._last_ns is not None and stamp_ns <= self._last_ns:
+            self._persons.clear()
+        self._last_ns = stamp_ns
+        time_s = stamp_ns * 1e-9
+        of_person: dict[int, list[Track]] = {}
+        for track in tracks:
+            if track.person_id is not None:
+                of_person.setdefault(track.person_id, []).append(track)
+        gestures = [self._of_person(person_id, own, width, time_s) for person_id, own in sorted(of_person.items())]
+        self._persons = {key: person for key, person in self._persons.items() if not person.is_gone(time_s)}
+        return [gesture for gesture in gestures if gesture is not None]
+
+    def _of_person(self, person_id: int, tracks: Sequence[Track], width: int, time_s: float) -> Gesture | None:
+        person = self._persons.get(person_id)
+        if person is None:
+            if not any(track.kind == "face" for track in tracks):
+                return None
+            person = self._persons[person_id] = Person(person_id, self._config)
+        return person.update(tracks, width, time_s)

@@ -1,0 +1,123 @@
+"""Which gesture a stroke is, by the number and the posture of the fingertips (paper section 4, [18]).
+
+Every frame of a stroke casts a vote by what it shows of the hand; the stroke's gesture is decided when it has settled and then
+kept, unless the recent votes say clearly otherwise.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Literal
+
+from deixis_schemas.messages import GestureKind
+
+from .fingertips import Finger
+from .hand import HandShape
+
+Vote = Literal["point_left", "point_right", "invisible", "other", "unclear"]
+
+# Fingers of an open hand stick out by 0.34 to 0.6 face widths, the thumb beside a pointing finger by less than 0.3.
+SPREAD_FINGER = 0.31
+POINTING_FINGER = 0.17
+LONG_FINGER = 0.4
+# An upright palm with closed fingers shows no finger, but is larger than a fist and points up.
+UPRIGHT_DEG = 38.0
+UPRIGHT_AREA = 0.42
+UPRIGHT_REACH = 0.5
+UPRIGHT_BELOW_FACE = 1.3
+FINGER_UP_DEG = 65.0
+# A blob wider than this is no single hand (a hand before the face, or a wall of skin colour).
+LARGEST_PALM = 0.42
+LARGEST_AREA = 1.0
+# Without a finger: the arm is stretched sideways this far, or the hand is large since it is held toward the camera.
+STRETCHED = 1.45
+NEAR_CAMERA_PALM = 0.29
+LOWEST_BELOW_FACE = 2.2
+HIGHEST_ABOVE_FACE = 0.6
+# Nearer to the face's centre line than this the side is the finger's direction, not the hand's place.
+CENTRAL = 1.0
+FINGER_DIRECTION = 0.15
+
+RECENT_S = 0.5
+OPEN_SHARE = 0.3
+FINGER_SHARE = 0.3
+INVISIBLE_SHARE = 0.6
+CHANGE_SHARE = 0.75
+
+
+def vote(hand: HandShape, fingers: Sequence[Finger]) -> Vote:
+    """What one frame shows of a raised, motionless hand; `fingers` the longest first."""
+    if hand.palm_radius > LARGEST_PALM or hand.area > LARGEST_AREA:
+        return "unclear"
+    spread = sum(finger.length >= SPREAD_FINGER for finger in fingers)
+    single = len(fingers) > 0 and fingers[0].length >= LONG_FINGER and spread == 1
+    if spread >= 2 or len(fingers) >= 4 or (_is_upright_palm(hand) and not single):
+        return "other"
+    if fingers and fingers[0].length >= POINTING_FINGER:
+        return _pointing(hand, fingers[0])
+    return "invisible" if _is_held_out(hand) else "unclear"
+
+
+def _is_upright_palm(hand: HandShape) -> bool:
+    return (
+        hand.elevation_deg >= UPRIGHT_DEG
+        and hand.area >= UPRIGHT_AREA
+        and hand.reach >= UPRIGHT_REACH
+        and hand.centroid[1] <= UPRIGHT_BELOW_FACE
+    )
+
+
+def _is_held_out(hand: HandShape) -> bool:
+    x, y = hand.centroid
+    if not -HIGHEST_ABOVE_FACE <= y <= LOWEST_BELOW_FACE:
+        return False
+    return abs(x) >= STRETCHED or hand.palm_radius >= NEAR_CAMERA_PALM
+
+
+def _pointing(hand: HandShape, finger: Finger) -> Vote:
+    dx, dy = finger.tip[0] - hand.palm[0], finger.tip[1] - hand.palm[1]
+    if -dy > abs(dx) * 2.1445:  # tan(FINGER_UP_DEG)
+        return "other"
+    x = finger.tip[0] if abs(hand.palm[0]) >= CENTRAL else dx
+    if abs(x) < FINGER_DIRECTION:
+        return "invisible" if _is_held_out(hand) else "unclear"
+    return "point_left" if x > 0 else "point_right"
+
+
+class StrokeGesture:
+    """The gesture of one stroke, from the votes of its frames."""
+
+    def __init__(self, settle_s: float) -> None:
+        self._settle_s = settle_s
+        self._votes: deque[tuple[float, Vote]] = deque(maxlen=256)
+        self._began_s: float | None = None
+        self.gesture: GestureKind = "none"
+
+    def add(self, time_s: float, seen: Vote, may_be_invisible: bool) -> GestureKind:
+        """Count a vote; `may_be_invisible`: the hand's history allows a pointing without a visible finger."""
+        if self._began_s is None:
+            self._began_s = time_s
+        if seen == "invisible" and not may_be_invisible:
+            seen = "unclear"
+        self._votes.append((time_s, seen))
+        if time_s - self._began_s < self._settle_s:
+            return self.gesture
+        recent = [v for t, v in self._votes if self.gesture == "none" or time_s - t <= RECENT_S]
+        winner, share = _winner(recent)
+        if self.gesture == "none" or (share >= CHANGE_SHARE and time_s - self._votes[0][0] >= RECENT_S):
+            self.gesture = winner
+        return self.gesture
+
+
+def _winner(votes: Sequence[Vote]) -> tuple[GestureKind, float]:
+    """The gesture of some votes and its share. An open hand needs few votes: a false pointing costs most."""
+    share = {kind: votes.count(kind) / len(votes) for kind in ("point_left", "point_right", "invisible", "other")}
+    if share["other"] >= OPEN_SHARE:
+        return "other", share["other"]
+    directed: GestureKind = "point_left" if share["point_left"] >= share["point_right"] else "point_right"
+    if share[directed] >= FINGER_SHARE:
+        return directed, share[directed]
+    if share["invisible"] >= INVISIBLE_SHARE:
+        return "invisible", share["invisible"]
+    return "other", 0.0
