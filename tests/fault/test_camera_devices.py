@@ -4,9 +4,14 @@ import errno
 import fcntl
 import os
 import struct
+import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
+from deixis_camera import devices
 from deixis_camera.config import CameraConfig
 from deixis_camera.devices import VIDIOC_QUERYCAP, VIDIOC_REQBUFS, Device, why_no_pictures, why_not_openable
 from deixis_camera.sources import SourceLost
@@ -31,6 +36,101 @@ def pretend_v4l(monkeypatch: pytest.MonkeyPatch, capabilities: int, refusal: int
         return 0
 
     monkeypatch.setattr(fcntl, "ioctl", ioctl)
+
+
+class FakeCapture:
+    """Stands in for cv2.VideoCapture on a V4L2 device: `pictures` of them, then none."""
+
+    def __init__(self, pictures: int, opened: bool = True) -> None:
+        self.left = pictures
+        self.opened = opened
+        self.released = False
+        self.settings: dict[int, float] = {}
+
+    def isOpened(self) -> bool:
+        return self.opened
+
+    def set(self, name: int, value: float) -> bool:
+        self.settings[name] = value
+        return True
+
+    def get(self, name: int) -> float:
+        return self.settings.get(name, 30.0)
+
+    def grab(self) -> bool:
+        return self.left > 0
+
+    def read(self) -> tuple[bool, np.ndarray | None]:
+        self.left -= 1
+        return (True, np.zeros((480, 640, 3), np.uint8)) if self.left >= 0 else (False, None)
+
+    def release(self) -> None:
+        self.released = True
+
+
+def with_capture(monkeypatch: pytest.MonkeyPatch, capture: FakeCapture) -> None:
+    monkeypatch.setattr(devices, "cv2", SimpleNamespace(**vars(cv2) | {"VideoCapture": lambda *_: capture}))
+
+
+def test_a_camera_is_asked_for_its_settings_and_its_pictures_carry_their_arrival(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+    capture = FakeCapture(pictures=3)
+    with_capture(monkeypatch, capture)
+    clock = iter([100, 133, 166])
+    config = CameraConfig(width=1280, height=720, rate_hz=15, pixel_format="MJPG")
+    device = Device(str(path), config, lambda: next(clock))
+    device.open()
+    asked = capture.settings
+    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT], device.rate_hz) == (1280, 720, 15.0)
+    assert asked[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"MJPG")
+    assert [(picture.seq, picture.time_ns) for picture in (device.read(), device.read(), device.read())] == [
+        (0, 100), (1, 133), (2, 166),
+    ]  # fmt: skip
+
+
+def test_a_camera_unplugged_while_it_streams_is_lost_and_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+    capture = FakeCapture(pictures=1)
+    with_capture(monkeypatch, capture)
+    device = Device(str(path), CameraConfig(), lambda: 0)
+    device.open()
+    device.read()
+    with pytest.raises(SourceLost, match="stopped giving pictures"):
+        device.read()
+    path.unlink()
+    with pytest.raises(SourceLost, match="is not there"):
+        device.read()
+    device.close()
+    assert capture.released
+
+
+@pytest.mark.parametrize("capture", [FakeCapture(0), FakeCapture(0, opened=False)])
+def test_a_camera_that_opens_but_gives_nothing_is_given_back_before_the_next_try(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capture: FakeCapture
+) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+    with_capture(monkeypatch, capture)
+    pretend_v4l(monkeypatch, capabilities=0x1, refusal=errno.EBUSY)
+    assert "is busy: another program uses it" in open_device(str(path))
+    assert capture.released
+
+
+def test_the_program_that_holds_a_camera_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+    pretend_v4l(monkeypatch, capabilities=0x1, refusal=errno.EBUSY)
+    with path.open("rb") as file:
+        holder = subprocess.Popen(["sleep", "30"], stdin=file)
+        try:
+            assert f"(sleep, process {holder.pid})" in why_no_pictures(str(path))
+        finally:
+            holder.kill()
+            holder.wait()
 
 
 def test_a_camera_that_is_not_plugged_in_is_named_and_may_come_back() -> None:

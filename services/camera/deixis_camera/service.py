@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 from deixis_runtime.queries import Query
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
@@ -236,6 +237,7 @@ class CameraStage:
 
 def serve(node: Node, config: CameraConfig) -> None:
     """Run the stage until shutdown."""
+    cv2.setNumThreads(1)  # scaling one picture is quick; threads cost the other stages more than they gain here
     CameraStage(node, config).run()
 
 

@@ -38,7 +38,8 @@ class Stream:
         self.close()
         parts = _split(self._url, self.name)
         if parts.scheme.startswith("rtsp"):
-            # Over TCP (no torn pictures) and without FFmpeg's read-ahead, which delays each picture by up to a second.
+            # Over TCP: no torn pictures. FFmpeg looks at a stream for about a second before it gives the first picture;
+            # without `nobuffer` the pictures of that second follow in a burst, old but stamped as new.
             os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay")
         config = self._config
         try:
@@ -52,7 +53,8 @@ class Stream:
             raise SourceLost(f"stream '{self.name}' {why_no_stream(parts)}") from None
         self._expected = self._decoder.expected_frames
         self.live = self._expected == 0
-        self.rate_hz = self._decoder.rate_hz
+        # Over HTTP a live stream does not say its rate, and FFmpeg then makes up 25.
+        self.rate_hz = 0.0 if self.live and parts.scheme.startswith("http") else self._decoder.rate_hz
         if not self.live:
             self._seq = 0
 
