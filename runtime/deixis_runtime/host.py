@@ -77,6 +77,7 @@ class Host:
         self._alive: set[str] = set()
         self._beats: dict[int, tuple[int, float]] = {}
         self._declared: list[object] = []
+        self._stopped: Callable[[], bool] = lambda: False
 
     def __enter__(self) -> Self:
         # A socket's path is limited to about 100 bytes, so not below the user's working directory.
@@ -89,11 +90,13 @@ class Host:
         self._declared.clear()
         self._stack.close()
 
-    def start(self, before_camera: Callable[[], None] | None = None) -> None:
+    def start(self, before_camera: Callable[[], None] | None = None, stopped: Callable[[], bool] = lambda: False) -> None:
         """Start the router, then the stages, the camera last, when those who look at its frames are ready.
 
-        `before_camera` is called with `session` open and before the first frame: to subscribe. Raises HostFailed.
+        `before_camera` is called with `session` open and before the first frame: to subscribe. `stopped` says whether to
+        give up waiting. Raises HostFailed.
         """
+        self._stopped = stopped
         self._start_router()
         others = tuple(name for name in self.options.stages if name != "camera")
         for name in others:
@@ -155,6 +158,8 @@ class Host:
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
                 raise HostFailed(f"{', '.join(p.name for p in ended)} ended while starting; its message stands above")
+            if self._stopped():
+                raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
                 raise HostFailed(f"not ready within {READY_TIMEOUT_S:.0f} s: {', '.join(missing())}")
             time.sleep(POLL_S)

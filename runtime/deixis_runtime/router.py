@@ -54,6 +54,9 @@ def main(argv: list[str] | None = None) -> int:
     setup_logging()
     zenoh.init_log_from_env_or("error")
     parent = os.getppid() if given.supervised else None
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
     try:
         session = zenoh.open(router_config(given.listen, given.connect, given.config))
     except Unreachable as error:
@@ -63,9 +66,6 @@ def main(argv: list[str] | None = None) -> int:
         where = ", ".join(given.listen)
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
     _watch_links(session, given.connect, stop, parent)
     close(session)
