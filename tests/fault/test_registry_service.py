@@ -1,0 +1,279 @@
+"""The fusion stage as a process behind a real router: edits, kill -9, silent and garbled neighbours."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from deixis_runtime.session import open_client
+from deixis_schemas import codec, topics
+from deixis_schemas.messages import (
+    Belief,
+    CameraInfo,
+    Gestures,
+    HeadPoses,
+    Message,
+    Poi,
+    State,
+    Target,
+    Track,
+    Tracks,
+)
+
+PATIENCE_S = 20.0
+K = [560.0, 0.0, 319.5, 0.0, 560.0, 239.5, 0.0, 0.0, 1.0]
+
+
+def wait_until(condition: Callable[[], Any], what: str) -> Any:
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        if value := condition():
+            return value
+        assert time.monotonic() < deadline, f"{what} did not come within {PATIENCE_S:g} s"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Endpoint of a router on loopback."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        name = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+    router = subprocess.Popen([sys.executable, "-m", "deixis_runtime.router", "--listen", name], stderr=subprocess.DEVNULL)
+    try:
+        wait_until(lambda: _answers(name), "the router")
+        yield name
+    finally:
+        router.terminate()
+        router.wait(10)
+
+
+def _answers(endpoint: str) -> bool:
+    with contextlib.suppress(ConnectionError), open_client(endpoint, shared_memory=False):
+        return True
+    return False
+
+
+class Bench:
+    """A robot's keys with nothing but fusion on them; the test plays the other stages."""
+
+    def __init__(self, session: zenoh.Session, endpoint: str, robot: str, registry: Path) -> None:
+        self.session = session
+        self.endpoint = endpoint
+        self.robot = robot
+        self.registry = registry
+        self.beliefs: list[Belief] = []
+        self.targets: list[Target] = []
+        self.process: subprocess.Popen[str] | None = None
+        self._lock = threading.Lock()
+        self._declared = [
+            session.declare_subscriber(topics.BELIEF.key(robot), lambda s: self._keep(self.beliefs, Belief, s)),
+            session.declare_subscriber(topics.TARGET.key(robot), lambda s: self._keep(self.targets, Target, s)),
+        ]
+
+    def _keep(self, heard: list[Any], type_: type[Message], sample: zenoh.Sample) -> None:
+        with self._lock:
+            heard.append(codec.decode(type_, sample.payload.to_bytes(), str(sample.encoding)))
+
+    def command(self, *more: str) -> list[str]:
+        sets = ["--set", f"registry={self.registry}", *more]
+        return [sys.executable, "-c", "import sys; from deixis_fusion.service import main; sys.exit(main())",
+                "--robot", self.robot, "--connect", self.endpoint, *sets]  # fmt: skip
+
+    def start(self, *more: str) -> None:
+        self.process = subprocess.Popen(self.command(*more), stderr=subprocess.DEVNULL, text=True)
+        wait_until(lambda: self.replies("fusion/state"), "fusion's state")
+
+    def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
+        assert self.process is not None
+        self.process.send_signal(how)
+        return self.process.wait(15)
+
+    def replies(self, path: str, payload: bytes | None = None, encoding: str | None = None) -> list[zenoh.Reply]:
+        selector = f"deixis/{self.robot}/{path}"
+        return list(self.session.get(selector, payload=payload, encoding=encoding, timeout=5.0))
+
+    def ask(self, path: str, payload: dict[str, Any] | None = None) -> tuple[str, str]:
+        """("ok" or "refused", text) of the one reply to an edit."""
+        body = json.dumps(payload).encode() if payload is not None else None
+        (reply,) = self.replies(path, body, "application/json" if body else None)
+        if reply.ok is not None:
+            return "ok", str(codec.decode_any(reply.ok.payload.to_bytes(), str(reply.ok.encoding)))
+        assert reply.err is not None
+        return "refused", reply.err.payload.to_string()
+
+    def state(self) -> State:
+        (reply,) = wait_until(lambda: self.replies("fusion/state"), "fusion's state")
+        assert reply.ok is not None
+        return codec.decode(State, reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+
+    def put(self, topic: topics.Topic, message: Message) -> None:
+        self.session.put(topic.key(self.robot), codec.encode(message), encoding=codec.encoding_of(type(message)))
+
+
+@pytest.fixture
+def bench(endpoint: str, tmp_path: Path) -> Iterator[Bench]:
+    with open_client(endpoint, shared_memory=False) as session:
+        made = Bench(session, endpoint, f"t-{os.getpid()}-{random.randrange(10**9)}", tmp_path / "pois.sqlite")
+        yield made
+        if made.process is not None and made.process.poll() is None:
+            made.process.kill()
+            made.process.wait(10)
+
+
+def source(status: str, stage: str) -> Callable[[State], bool]:
+    return lambda state: any(s.stage == stage and s.status == status for s in state.sources)
+
+
+def camera_info(state: str = "streaming", last_seq: int = -1) -> CameraInfo:
+    content = {"stamp_ns": 0, "stage": "camera", "instance": "c", "state": state, "source": "test", "width": 640, "height": 480}
+    return CameraInfo.model_validate(content | {"camera_matrix": K, "last_seq": last_seq})
+
+
+def of_frame(stage: str, seq: int) -> dict[str, Any]:
+    return {"seq": seq, "stamp_ns": 10**18 + seq * 33_333_333, "stage": stage, "instance": "x"}
+
+
+def face() -> Track:
+    return Track.model_validate(
+        {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
+        | {"bbox_px": (295, 210, 51, 60), "velocity_px_s": (0, 0)}
+    )
+
+
+def show(bench: Bench, seq: int, *, head: bool = True) -> None:
+    """One frame of a person who points left and looks there, 2 m ahead."""
+    bench.put(topics.TRACKS, Tracks(**of_frame("tracker", seq), width=640, height=480, tracks=[face()]))
+    pose = {"person_id": 1, "status": "tracking", "yaw_deg": 60.0, "yaw_sigma_deg": 3.0}
+    if head:
+        bench.put(topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq) | {"poses": [pose]}))
+    hand = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 10.0}
+    bench.put(topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq) | {"gestures": [hand]}))
+    wait_until(lambda: bench.beliefs and bench.beliefs[-1].seq == seq, f"the belief of frame {seq}")
+
+
+def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(bench: Bench) -> None:
+    bench.start()
+    acknowledged: dict[str, float] = {}
+    assert bench.process is not None
+    killer = threading.Timer(0.5, bench.process.kill)
+    killer.start()
+    for i in range(100_000):
+        if bench.process.poll() is not None:
+            break
+        replies = bench.replies(f"fusion/poi/p{i % 25}", json.dumps({"position_m": [i, 0, 0]}).encode(), "application/json")
+        if replies and replies[0].ok is not None:
+            acknowledged[f"p{i % 25}"] = float(i)
+    killer.join()
+    assert bench.process.wait(10) == -signal.SIGKILL
+    assert len(acknowledged) > 5
+    bench.start()
+    stored = {poi.poi_id: poi.position_m[0] for poi in bench.state().pois}
+    assert all(stored[poi_id] >= x for poi_id, x in acknowledged.items())
+    assert sum(stored[poi_id] != x for poi_id, x in acknowledged.items()) <= 1
+    assert bench.stop() == 0
+
+
+def test_edits_are_answered_or_refused_with_the_fields_name_and_seen_in_state(bench: Bench) -> None:
+    bench.start()
+    assert bench.ask("fusion/poi/vase", {"position_m": [1, 2, 3]})[0] == "ok"
+    assert bench.ask("fusion/poi/vase", {"position_m": [1, 2, "x"]}) == (
+        "refused", "position_m.2: Input should be a valid number, unable to parse string as a number",
+    )  # fmt: skip
+    assert bench.ask("fusion/poi/ghost?op=delete")[1].startswith("poi_id: there is no POI 'ghost'")
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi/door", b'{"position_m": [4, 5, 6]}')
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi/bad", b'{"position_m": 4}')
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi/vase/../..", b"garbage")
+    wait_until(lambda: bench.state().edits_rejected >= 4, "four refused edits")
+    state = bench.state()
+    assert [poi.poi_id for poi in state.pois] == ["door", "vase"]
+    assert any(edit.key.endswith("/bad") and edit.reason.startswith("position_m") for edit in state.rejected_edits)
+    keys = sorted(str(r.ok.key_expr).rsplit("/", 1)[1] for r in bench.replies("fusion/poi/**?format=json") if r.ok is not None)
+    assert keys == ["door", "vase"]
+    bench.session.delete(f"deixis/{bench.robot}/fusion/poi/door")
+    wait_until(lambda: [poi.poi_id for poi in bench.state().pois] == ["vase"], "the delete")
+    assert bench.stop() == 0
+
+
+def test_two_stages_on_one_registry_file_the_second_exits_with_one_clear_error(bench: Bench) -> None:
+    bench.start()
+    second = subprocess.run(bench.command(), capture_output=True, text=True, timeout=20, check=False)
+    assert second.returncode == 78
+    assert "is locked by another process" in second.stderr
+    assert "Traceback" not in second.stderr
+
+
+def test_a_frame_is_answered_without_a_silent_stage_and_the_episode_ends_with_the_source(bench: Bench) -> None:
+    bench.start()
+    bench.put(topics.CAMERA_INFO, camera_info())
+    # 2 m ahead of the robot stands the person; 60 degrees to the person's left, 2 m away, the vase.
+    bench.ask("fusion/poi/vase", {"position_m": [1.0, -1.73, 1.3]})
+    bench.ask("fusion/poi/door", {"position_m": [1.0, 1.73, 1.3]})
+    for seq in range(20):
+        show(bench, seq)
+    assert bench.beliefs[-1].missing == []
+    (person,) = bench.beliefs[-1].persons
+    assert {e.source: (e.producer, e.status) for e in person.evidence} == {
+        "gesture": ("gesture/x", "ok"), "headpose": ("headpose/x", "ok"),
+    }  # fmt: skip
+    bench.put(topics.CAMERA_INFO, camera_info("ended", 19))
+    wait_until(lambda: [t for t in bench.targets if t.final], "the final target")
+    (final,) = [target for target in bench.targets if target.final]
+    assert final.poi_ids == ["vase"]
+    assert [target.episode_id for target in bench.state().recent_targets] == [final.episode_id]
+    show(bench, 30, head=False)
+    assert bench.beliefs[-1].missing == ["headpose"]
+    said = next(e for e in bench.beliefs[-1].persons[0].evidence if e.source == "headpose")
+    assert (said.status in ("late", "dead"), said.weight) == (True, 0.0)
+
+
+def test_garbage_on_every_key_is_counted_and_the_stage_goes_on(bench: Bench) -> None:
+    bench.start()
+    bench.put(topics.CAMERA_INFO, camera_info())
+    for topic in (topics.TRACKS, topics.GESTURES, topics.CAMERA_INFO, topics.ROBOT_POSE):
+        for payload in (b"", b"\x00\xff garbage", b"\x80"):
+            bench.session.put(topic.key(bench.robot), payload, encoding=codec.encoding_of(topic.type))
+    bench.session.put(topics.HEAD_POSES.key(bench.robot), b"\x80", encoding=f"{codec.MSGPACK};HeadPoses/9")
+    wait_until(lambda: source("wrong_version", "headpose")(bench.state()), "headpose's wrong version in the state")
+    show(bench, 1)
+    wait_until(lambda: source("ok", "headpose")(bench.state()), "headpose being well again")
+    rejected = {s.stage: s.rejected for s in bench.state().sources}
+    assert rejected["tracker"] >= 1
+    assert rejected["headpose"] == 1
+    assert bench.process is not None
+    assert bench.process.poll() is None
+
+
+def test_two_producers_on_one_key_are_noticed_and_said(bench: Bench) -> None:
+    bench.start()
+    for _ in range(3):
+        for instance in ("one", "two"):
+            content = of_frame("headpose", 1) | {"instance": instance}
+            bench.put(topics.HEAD_POSES, HeadPoses.model_validate(content))
+    wait_until(lambda: any("2 producers" in s.reason for s in bench.state().sources), "two producers in the state")
+    heads = next(s for s in bench.state().sources if s.stage == "headpose")
+    assert heads.producers == ["headpose/one", "headpose/two"]
+
+
+def test_the_site_file_gives_the_first_pois_and_a_bad_setting_is_named(bench: Bench, tmp_path: Path) -> None:
+    site = tmp_path / "site.yaml"
+    site.write_text("pois:\n  - {poi_id: vase, position_m: [1, 2, 3]}\n")
+    bench.start("--site", str(site))
+    assert [poi.poi_id for poi in bench.state().pois] == ["vase"]
+    assert isinstance(bench.state().pois[0], Poi)
+    bench.stop()
+    bad = subprocess.run(bench.command("--set", "face_width_m=9"), capture_output=True, text=True, timeout=20, check=False)
+    assert bad.returncode == 78
+    assert "face_width_m" in bad.stderr
