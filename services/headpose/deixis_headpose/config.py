@@ -1,0 +1,44 @@
+"""Settings of the headpose stage."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class HeadposeConfig(BaseModel):
+    """Settings of the headpose stage; defaults are for adults one to four metres from a VGA camera."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    max_persons: int = Field(default=3, ge=1, le=16, description="Heads matched per frame, largest first; bounds the work.")
+    frames_kept: int = Field(default=6, ge=1, le=64, description="Last frames kept to be joined with their tracks.")
+    horizontal_fov_deg: float = Field(
+        default=60.0,
+        gt=5,
+        lt=170,
+        description="Horizontal field of view of the camera, degrees. It matters little: a head starts as looking into the "
+        "camera, and turns are measured from there.",
+    )
+
+    head_semi_axes_m: tuple[float, float, float] = Field(
+        default=(0.080, 0.115, 0.095), description="Semi-axes of the head's ellipsoid: across, up, along, metres."
+    )
+    surface_points: int = Field(default=900, ge=200, le=10000, description="Points spread over the whole ellipsoid.")
+    working_width_px: float = Field(default=64.0, ge=24, le=400, description="Heads wider than this are scaled down, pixels.")
+    pyramid_levels: int = Field(default=3, ge=1, le=5, description="Resolution levels of the matching.")
+    iterations: int = Field(default=5, ge=1, le=50, description="Iterations per level at most.")
+    templates: int = Field(default=2, ge=1, le=8, description="Keyframes matched at once.")
+
+    keyframe_spacing_deg: float = Field(default=14.0, gt=1, le=45, description="A new keyframe where none is this near.")
+    keyframe_limit: int = Field(default=60, ge=1, le=500, description="Keyframes of one head at most.")
+    gate: float = Field(default=0.75, gt=0, lt=1, description="Unweighted correlation below which a match is not believed.")
+    keyframe_gate: float = Field(default=0.82, gt=0, lt=1, description="Correlation needed to take a keyframe.")
+
+    range_deg: float = Field(default=100.0, gt=30, le=150, description="Yaw beyond which the head is out of range, degrees.")
+    turned_deg: float = Field(default=45.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
+    hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
+    forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
+
+    initial_views: int = Field(default=3, ge=1, le=30, description="Frontal detections that must agree to start a head.")
+    haar_width_m: float = Field(default=0.180, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
+    haar_drop_m: float = Field(default=0.006, ge=-0.1, le=0.1, description="How far that box's centre lies below the head's.")

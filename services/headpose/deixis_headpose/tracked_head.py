@@ -1,0 +1,177 @@
+"""One head through time: start, prediction, matching against keyframes, the gate, holding and finding it again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from deixis_schemas.messages import HeadPose, PoseStatus, Side, Track
+from numpy.typing import NDArray
+
+from .config import HeadposeConfig
+from .head import Array, Camera, Pose, Surface, facing_camera, rotation_of
+from .initialise import Initialiser, find_frontal_face, frontal_pose
+from .keyframes import Keyframes, take_keyframe
+from .lsm import Match, correlation, match, observe
+from .patch import Level, pyramid
+from .uncertainty import yaw_sigma_deg
+
+PRIOR_SIGMA = np.array([*np.radians([10.0, 12.0, 10.0]), 0.06, 0.06, 0.03])
+"""Pose step from one frame to the next: turn about x, y, z (rad), shift (m)."""
+SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
+"""Turns tried about the vertical where the predicted pose does not match."""
+
+
+class Sight(NamedTuple):
+    """What one frame shows of one person."""
+
+    grey: NDArray[np.uint8]
+    camera: Camera
+    face: Track
+    hands: Sequence[Track]
+    stamp_ns: int
+
+
+@dataclass(frozen=True)
+class HeadState:
+    """The answer for one head in one frame."""
+
+    status: PoseStatus
+    angles_deg: tuple[float, float, float] | None = None
+    sigma_deg: float | None = None
+    side: Side | None = None
+
+    def of_person(self, person_id: int) -> HeadPose:
+        """As a message."""
+        if self.status != "tracking" or self.angles_deg is None:
+            return HeadPose(person_id=person_id, status=self.status, side=self.side)
+        yaw, pitch, roll = self.angles_deg
+        return HeadPose(
+            person_id=person_id, status=self.status, yaw_deg=yaw, yaw_sigma_deg=self.sigma_deg, pitch_deg=pitch, roll_deg=roll
+        )
+
+
+class TrackedHead:
+    """Tracks one head."""
+
+    def __init__(self, config: HeadposeConfig, surface: Surface) -> None:
+        self._config = config
+        self._surface = surface
+        self._initialiser = Initialiser(config.initial_views)
+        self._keyframes = Keyframes(config.keyframe_spacing_deg, config.keyframe_limit)
+        self._pose: Pose | None = None
+        self._correlation = 0.0
+        self._velocity: Array = np.zeros(6)
+        self._matched_ns = 0
+
+    def update(self, sight: Sight) -> HeadState:
+        """The head in the next frame."""
+        if self._pose is None:
+            return self._initialise(sight)
+        dt = (sight.stamp_ns - self._matched_ns) * 1e-9
+        found = self._match(sight, self._pose, dt)
+        if found is None:
+            return self._hold(dt)
+        self._accept(sight, found, self._pose, dt)
+        return self._state(held_s=0.0)
+
+    # --- start -----------------------------------------------------------------------------------------------------
+
+    def _initialise(self, sight: Sight) -> HeadState:
+        x, y, width, height = sight.face.bbox_px
+        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
+        face = find_frontal_face(sight.grey, centre, width)
+        agreed = self._initialiser.update(face, centre)
+        if agreed is None:
+            return HeadState("initialising")
+        pose = frontal_pose(agreed, sight.camera, self._config.haar_width_m, self._config.haar_drop_m)
+        levels = self._levels(sight, pose)
+        self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera, 1.5))
+        self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.stamp_ns
+        return self._state(held_s=0.0)
+
+    # --- matching --------------------------------------------------------------------------------------------------
+
+    def _match(self, sight: Sight, last: Pose, dt: float) -> Match | None:
+        """Match the keyframes to the frame, from the predicted pose, else by a search; none where the gate stays shut."""
+        levels = self._levels(sight, last)
+        step = self._velocity * dt
+        starts = [last, last.moved(step), last.moved(1.6 * step)]
+        found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera)
+        if found.correlation >= self._config.gate:
+            return found
+        starts = [turned(pose, turn) for pose in starts[:2] for turn in SEARCH_TURNS_DEG]
+        other = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera)
+        best = max(found, other, key=lambda m: m.correlation)
+        return best if best.correlation >= self._config.gate else None
+
+    def _best_start(self, levels: Sequence[Level], starts: Sequence[Pose], camera: Camera) -> Pose:
+        """The start at which the keyframes correlate best on the coarsest level."""
+        scores = []
+        for start in starts:
+            templates = [view.templates[-1] for view in self._keyframes.nearest(start, self._config.templates)]
+            scores.append(correlation(observe(levels[-1], self._surface, start, camera), templates))
+        return starts[int(np.argmax(scores))]
+
+    def _refine(self, levels: Sequence[Level], start: Pose, camera: Camera) -> Match:
+        """Match from the coarsest level to the finest, each with the keyframes nearest to the pose so far."""
+        found = Match(start, -1.0, np.diag(PRIOR_SIGMA**2))
+        for k in reversed(range(len(levels))):
+            views = self._keyframes.nearest(found.pose, self._config.templates)
+            templates = [view.templates[k] for view in views]
+            found = match(levels[k], self._surface, templates, found.pose, camera, PRIOR_SIGMA, self._config.iterations)
+        return found
+
+    def _levels(self, sight: Sight, pose: Pose) -> list[Level]:
+        x, y, z = pose.position_m
+        camera = sight.camera
+        centre = (camera.focal_px * x / z + camera.centre_x_px, camera.focal_px * y / z + camera.centre_y_px)
+        width = 2 * self._config.head_semi_axes_m[0] * camera.focal_px / z
+        return pyramid(sight.grey, centre, width, self._config.working_width_px, self._config.pyramid_levels)
+
+    # --- after the match -------------------------------------------------------------------------------------------
+
+    def _accept(self, sight: Sight, found: Match, last: Pose, dt: float) -> None:
+        self._velocity = found.pose.step_from(last) / max(dt, 1e-3)
+        self._pose, self._correlation, self._matched_ns = found.pose, found.correlation, sight.stamp_ns
+        if found.correlation >= self._config.keyframe_gate and not _hand_near(sight) and self._keyframes.wants(found.pose):
+            levels = self._levels(sight, found.pose)
+            self._keyframes.add(take_keyframe(levels, self._surface, found.pose, sight.camera, 1.5))
+
+    def _hold(self, dt: float) -> HeadState:
+        """Below the gate: hold the pose for a while, then say that it is out of range or lost."""
+        self._velocity = np.zeros(6)
+        assert self._pose is not None
+        yaw = self._pose.angles_deg()[0]
+        if dt <= self._config.hold_s:
+            return self._state(held_s=dt)
+        if abs(yaw) >= self._config.turned_deg:
+            return HeadState("out_of_range", side=_side(yaw))
+        return HeadState("lost")
+
+    def _state(self, held_s: float) -> HeadState:
+        assert self._pose is not None
+        angles = self._pose.angles_deg()
+        if abs(angles[0]) > self._config.range_deg:
+            return HeadState("out_of_range", side=_side(angles[0]))
+        return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
+
+
+def turned(pose: Pose, turn_deg: float) -> Pose:
+    """The pose with the head turned about its own vertical, toward image right."""
+    facing = facing_camera(pose.position_m)
+    return replace(pose, rotation=facing @ rotation_of(np.radians(turn_deg), 0.0) @ facing.T @ pose.rotation)
+
+
+def _side(yaw_deg: float) -> Side:
+    return "left" if yaw_deg > 0 else "right"
+
+
+def _hand_near(sight: Sight) -> bool:
+    """Whether a hand's box comes within 0.3 face widths of the face's: keyframes must not learn hands."""
+    x, y, w, h = sight.face.bbox_px
+    gap = 0.3 * w
+    boxes = [hand.bbox_px for hand in sight.hands]
+    return any(a < x + w + gap and x < a + c + gap and b < y + h + gap and y < b + d + gap for a, b, c, d in boxes)
