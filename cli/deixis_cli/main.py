@@ -1,0 +1,48 @@
+"""The `deixis` command. Subcommands are entry points of the group `deixis.commands`: `register(subparsers)`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib.metadata import entry_points
+
+from deixis_runtime.host import HostFailed
+from deixis_runtime.session import Unreachable, exit_now
+from deixis_runtime.stage import setup_logging
+
+from .options import CommandError
+
+GROUP = "deixis.commands"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with all subcommands that are installed here."""
+    top = argparse.ArgumentParser(prog="deixis", description="Tells a robot which thing a person is pointing at.")
+    subparsers = top.add_subparsers(metavar="COMMAND", required=True)
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        entry.load()(subparsers)
+    return top
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command. Exit status 0 when it did its job; 1 with the cause on standard error; 2 for bad usage."""
+    given = parser().parse_args(argv)
+    setup_logging()
+    try:
+        return int(given.run(given))
+    except (CommandError, HostFailed, Unreachable) as error:
+        print(f"deixis: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+def command() -> None:
+    """The console script: leaves at once when the command is done, whatever threads a cut session has left."""
+    try:
+        status = main()
+    except SystemExit as error:  # argparse: help or bad usage
+        status = error.code if isinstance(error.code, int) else 1
+    except BrokenPipeError:  # `deixis watch | head`
+        status = 1
+    exit_now(status)

@@ -1,0 +1,111 @@
+"""Options that several commands share, and what is read from them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from deixis_runtime.host import HostOptions, chosen_stages
+from deixis_runtime.session import DEFAULT_ENDPOINT
+from deixis_runtime.settings import robot_name
+from deixis_runtime.site import Site, SiteError, load_site
+from deixis_schemas import topics
+
+DEMO_ROBOT = "demo"
+
+
+class CommandError(Exception):
+    """A command that cannot do its job; the text says why."""
+
+
+def add_robot(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """--robot; required where there is no default: two robots must never cross-talk by accident."""
+    shown = f"name of the robot, the second part of every key{f' (default: {default})' if default else ''}"
+    parser.add_argument("--robot", required=default is None, default=default, type=robot_name, metavar="NAME", help=shown)
+
+
+def add_connect(parser: argparse.ArgumentParser) -> None:
+    """--connect of a command that asks a running system."""
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router of the system (default: %(default)s)"
+    )
+
+
+def add_json(parser: argparse.ArgumentParser, what: str) -> None:
+    """--json."""
+    parser.add_argument("--json", action="store_true", help=what)
+
+
+def add_host(parser: argparse.ArgumentParser) -> None:
+    """What a command that starts stages needs to know."""
+    parser.add_argument("--site", type=Path, metavar="FILE", help="site file: camera, walls, points of interest, settings")
+    parser.add_argument(
+        "--listen",
+        action="append",
+        metavar="ENDPOINT",
+        help=f"where others reach this host's router; may be given again (default: {DEFAULT_ENDPOINT})",
+    )
+    parser.add_argument("--only", action="append", default=[], metavar="STAGES", help="start these stages only, e.g. camera")
+    parser.add_argument("--except", action="append", default=[], dest="without", metavar="STAGES", help="start all but these")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="sets",
+        metavar="STAGE.NAME=VALUE",
+        help="override a setting, e.g. camera.encoding=jpeg; may be given again",
+    )
+    parser.add_argument("--registry", type=Path, metavar="FILE", help="SQLite file of the points of interest")
+
+
+def host_options(given: argparse.Namespace, camera: dict[str, str] | None = None, **others: object) -> HostOptions:
+    """The host's options from what `add_host` reads; `camera` holds settings of it. Raises CommandError, HostFailed."""
+    stages = chosen_stages(_names(given.only), _names(given.without))
+    sets = stage_settings(given.sets)
+    # Ahead of --set, which so may override them.
+    ours = [f"{name}={value}" for name, value in (camera or {}).items()]
+    sets["camera"] = (*ours, *sets.get("camera", ()))
+    if given.registry is not None:
+        sets["fusion"] = (f"registry={quoted(str(given.registry.resolve()))}", *sets.get("fusion", ()))
+    for stage in sets:
+        if sets[stage] and stage not in stages:
+            raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
+    site = given.site.resolve() if given.site is not None else None
+    listen = tuple(given.listen or (DEFAULT_ENDPOINT,))
+    return HostOptions(robot=given.robot, stages=stages, site=site, listen=listen, sets=sets, **others)  # type: ignore[arg-type]
+
+
+def stage_settings(items: list[str]) -> dict[str, tuple[str, ...]]:
+    """`STAGE.NAME=VALUE` by stage. Raises CommandError."""
+    found: dict[str, tuple[str, ...]] = {}
+    for item in items:
+        name, equals, value = item.partition("=")
+        stage, dot, field = name.partition(".")
+        if not (equals and dot and stage and field):
+            raise CommandError(f"--set {item}: not of the form STAGE.NAME=VALUE, e.g. camera.encoding=jpeg")
+        found[stage] = (*found.get(stage, ()), f"{field}={value}")
+    return found
+
+
+def read_site(path: Path | None) -> Site | None:
+    """The site file, checked before anything starts. Raises CommandError."""
+    if path is None:
+        return None
+    try:
+        site = load_site(path)
+    except SiteError as error:
+        raise CommandError(str(error)) from None
+    for stage in site.settings:
+        if stage not in topics.STAGES:
+            raise CommandError(f"site file {path}: settings.{stage}: there is no such stage ({', '.join(topics.STAGES)})")
+    return site
+
+
+def quoted(text: str) -> str:
+    """The text as a YAML string, whatever it holds."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _names(items: list[str]) -> tuple[str, ...]:
+    return tuple(name.strip() for item in items for name in item.split(",") if name.strip())

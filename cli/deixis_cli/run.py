@@ -1,0 +1,131 @@
+"""`deixis run`: router and all stages as processes on this machine, a source played through them, the answers named."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from deixis_runtime.host import HostFailed, HostOptions
+from deixis_schemas.messages import Target
+from rich.console import Console
+
+from . import wording
+from .live_view import view_for
+from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site
+from .play import PlayResult, play
+from .source import Source, read_source
+
+EXPECTED_MISSED = 1
+
+
+def register(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "run", help="run everything on this machine and name what is pointed at", description=__doc__
+    )
+    parser.add_argument("source", metavar="SOURCE", help="device number, file, folder of pictures or URL")
+    add_robot(parser, default=DEMO_ROBOT)
+    add_host(parser)
+    parser.add_argument("--lockstep", action="store_true", help="feed a frame when the last is answered: reproducible")
+    parser.add_argument("--loop", action="store_true", help="play a file again and again")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write NAME.jsonl there, one line per message published")
+    parser.add_argument("--expect", metavar="POI_ID", help="succeed only if the single final answer is exactly this POI")
+    parser.add_argument("--timeout", type=float, metavar="SECONDS", help="give up when the source has not ended by then")
+    add_json(parser, "print one JSON document at the end, and nothing before")
+    parser.set_defaults(run=run)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Play SOURCE. 0 when done (for live sources and --loop also on Ctrl-C), 1 with the cause, 130 on Ctrl-C before the end."""
+    source = read_source(given.source)
+    options, names = _options(given, source)
+    # What is worth reading of the stages' own logs is shown by the view; they still report what is wrong.
+    os.environ.setdefault("DEIXIS_LOG", "WARNING")
+    console = Console()
+    view = nullcontext() if given.json else view_for(console, names, options.stages)
+    with view as shown:
+        result = play(
+            options,
+            out=given.out,
+            name=source.name,
+            on_message=shown.hear if shown else None,
+            timeout_s=given.timeout,
+        )
+    names |= {poi.poi_id: poi.name for poi in result.state.pois} if result.state else {}
+    if given.json:
+        print(json.dumps(document(given.robot, given.source, result)))
+    else:
+        print_answers(console, result, names)
+    return exit_status(result, endless=source.live or given.loop, expected=given.expect)
+
+
+def exit_status(result: PlayResult, *, endless: bool, expected: str | None) -> int:
+    """The status of a run, with its cause on standard error. An `endless` source is ended by an interrupt in good order."""
+    if result.failure is not None and result.signal is None:
+        print(f"deixis run: {result.failure}", file=sys.stderr)
+        return 1
+    if result.signal is not None and not (endless and result.frames):
+        print(f"deixis run: stopped by {signal.Signals(result.signal).name} before the end", file=sys.stderr)
+        return 128 + result.signal
+    if expected is not None and [target.poi_ids for target in result.targets] != [[expected]]:
+        answers = "; ".join(" or ".join(target.poi_ids) or "no answer" for target in result.targets) or "no pointing at all"
+        print(f"deixis run: expected the one answer '{expected}', but got: {answers}", file=sys.stderr)
+        return EXPECTED_MISSED
+    return 0
+
+
+def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -> None:
+    """The final answers, and how the run fared, as text."""
+    for target in result.targets:
+        console.out(_answer_text(target, names), highlight=False)
+    if not result.targets:
+        console.out("\nNobody was seen pointing.", highlight=False)
+    counts = result.counters
+    played = f"\n{result.frames} frames in {result.wall_s:.1f} s, {counts.get('Belief', 0)} answered"
+    rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
+    console.out(f"{played}{rejected}.", highlight=False)
+
+
+def document(robot: str, source: str, result: PlayResult) -> dict[str, Any]:
+    """The JSON document of `--json`."""
+    return {
+        "robot": robot,
+        "source": result.camera.source if result.camera else source,
+        "frames": result.frames,
+        "answers": [target.model_dump(mode="json") for target in result.targets],
+        "camera": result.camera.model_dump(mode="json") if result.camera else None,
+        "health": {stage: health.model_dump(mode="json") for stage, health in sorted(result.health.items())},
+        "counters": dict(sorted(result.counters.items())),
+        "failure": result.failure,
+        "wall_s": round(result.wall_s, 3),
+    }
+
+
+def _answer_text(target: Target, names: dict[str, str]) -> str:
+    standing = {poi.poi_id: poi for poi in target.pois}
+    lines = [f"\nPerson {target.person_id} points at: {wording.answer(target, names)}"]
+    for poi_id in target.poi_ids:
+        if poi_id in standing:
+            poi = standing[poi_id]
+            lines.append(
+                f"  {poi_id}: belief {poi.belief:.3f}, plausibility {poi.plausibility:.3f}, pignistic {poi.pignistic:.3f}"
+            )
+    return "\n".join([*lines, f"  conflict {target.conflict:.3f}", f"  {target.reason}"])
+
+
+def _options(given: argparse.Namespace, source: Source) -> tuple[HostOptions, dict[str, str]]:
+    site = read_site(given.site)
+    camera = {"source": quoted(source.setting)} | ({"loop": "true"} if given.loop else {})
+    try:
+        options = host_options(given, camera, lockstep=given.lockstep)
+    except HostFailed as error:
+        raise CommandError(str(error)) from None
+    if "camera" not in options.stages:
+        raise CommandError("'deixis run' plays a source and so needs the camera; 'deixis up' starts part of the stages")
+    return options, {poi.poi_id: poi.name for poi in site.pois} if site else {}

@@ -1,0 +1,90 @@
+"""What every stage sees at the moment, gathered from what is published."""
+
+from __future__ import annotations
+
+from deixis_schemas.messages import (
+    Belief,
+    CameraInfo,
+    Frame,
+    Gestures,
+    HeadPoses,
+    Health,
+    Message,
+    OfFrame,
+    Poi,
+    Target,
+    Tracks,
+)
+
+from . import wording
+
+
+class Summary:
+    """The newest words on each stage. `names` are POI names by id; it learns those that are put."""
+
+    def __init__(self, names: dict[str, str]) -> None:
+        self.names = names
+        self.camera = "waiting for the camera"
+        self.words: dict[str, str] = {}
+        self.target: Target | None = None
+        self.clip_s = 0.0
+        self.seq = -1
+        self._first_ns: int | None = None
+        self._frames = 0
+        self._frames_since: tuple[int, int] | None = None
+        self._rate_hz = 0.0
+        self._answers = 0
+        self._health: dict[str, Health] = {}
+
+    def hear(self, message: Message) -> None:
+        """Take in one message."""
+        if isinstance(message, Frame):
+            self._hear_frame(message)
+        elif isinstance(message, Tracks):
+            self.words["tracker"] = wording.tracked(message)
+        elif isinstance(message, HeadPoses):
+            self.words["headpose"] = wording.heads(message)
+        elif isinstance(message, Gestures):
+            self.words["gesture"] = wording.gestures(message)
+        elif isinstance(message, Belief):
+            self._answers += 1
+            self.words["fusion"] = wording.belief(message, self.names)
+        elif isinstance(message, Target):
+            self.target = message
+        elif isinstance(message, Poi):
+            self.names[message.poi_id] = message.name
+        elif isinstance(message, CameraInfo):
+            self.camera = message.state + (f": {message.reason}" if message.reason else "")
+        elif isinstance(message, Health):
+            self._health[message.stage] = message
+
+    def rate_hz(self) -> float:
+        """Frames per second of clip time, over about the last second."""
+        return self._rate_hz
+
+    def drops(self) -> int:
+        """Frames that got no answer so far, less the one on its way."""
+        return max(0, self._frames - self._answers - 1) if self._answers else 0
+
+    def faults(self) -> list[str]:
+        """Stages that say that they are not well."""
+        return [f"{stage} {item.state}: {item.reason}" for stage, item in sorted(self._health.items()) if item.state != "ok"]
+
+    def line(self) -> str:
+        """Everything in one line."""
+        frame = f"{self.clip_s:6.1f} s  frame {self.seq}  {self._rate_hz:.0f}/s  {self.drops()} dropped"
+        return " | ".join(
+            [frame, *(self.words[stage] for stage in ("tracker", "headpose", "gesture", "fusion") if stage in self.words)]
+        )
+
+    def _hear_frame(self, frame: OfFrame) -> None:
+        if self._first_ns is None or frame.stamp_ns < self._first_ns:
+            self._first_ns, self._frames_since = frame.stamp_ns, None
+        self._frames += 1
+        self.seq = frame.seq
+        self.clip_s = (frame.stamp_ns - self._first_ns) / 1e9
+        since = self._frames_since or (frame.stamp_ns, self._frames)
+        if frame.stamp_ns - since[0] >= 1_000_000_000:
+            self._rate_hz = (self._frames - since[1]) * 1e9 / (frame.stamp_ns - since[0])
+            since = (frame.stamp_ns, self._frames)
+        self._frames_since = since
