@@ -1,0 +1,71 @@
+"""The site file and the camera calibration that belong to a labelled clip, made from its truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from .clips import Clip, TrueCamera, Vector
+
+CALIBRATION_FILE = "camera.yaml"
+
+
+def map_position(camera: TrueCamera, world: Vector) -> tuple[float, float, float]:
+    """A world point in the robot's map frame: x forward and y left from the camera's foot, z up (REP-103), metres.
+
+    Forward is the horizontal part of the optical axis; world and map share the vertical.
+    """
+    rotation = np.array(camera.R_world_to_cam).reshape(3, 3)
+    centre = -rotation.T @ np.array(camera.t_world_to_cam)
+    ahead = np.array([rotation[2, 0], 0.0, rotation[2, 2]])
+    ahead /= np.linalg.norm(ahead)
+    left = np.cross([0.0, 1.0, 0.0], ahead)
+    offset = np.array(world) - centre
+    return float(offset @ ahead), float(offset @ left), float(world[1])
+
+
+def site_content(clip: Clip, registry: Path) -> dict[str, Any]:
+    """The mapping that a site file for the clip holds. The robot stands at the map's origin; walls are not in the truth."""
+    camera = clip.truth.meta.camera
+    return {
+        "name": f"labelled clip {clip.name}",
+        "camera": {
+            "source": str(clip.video.resolve()),
+            "calibration": CALIBRATION_FILE,
+            "mount": {"position_m": [0.0, 0.0, camera.height_m], "yaw_deg": 0.0, "pitch_up_deg": camera.pitch_up_deg},
+        },
+        "pois": [
+            {"poi_id": poi.id, "position_m": [round(value, 6) for value in map_position(camera, poi.xyz_world)]}
+            for poi in clip.truth.meta.pois
+        ],
+        "settings": {"fusion": {"registry": str(registry)}},
+    }
+
+
+def calibration_content(clip: Clip) -> dict[str, Any]:
+    """A ROS camera_info mapping with the clip's intrinsics."""
+    meta = clip.truth.meta
+    matrix = [value for row in meta.camera.K for value in row]
+    distortion = list(meta.camera.dist) or [0.0] * 5
+    projection = [value for row in meta.camera.K for value in (*row, 0.0)]
+    return {
+        "image_width": meta.width,
+        "image_height": meta.height,
+        "camera_name": clip.name,
+        "camera_matrix": {"rows": 3, "cols": 3, "data": matrix},
+        "distortion_model": "plumb_bob" if len(distortion) <= 5 else "rational_polynomial",
+        "distortion_coefficients": {"rows": 1, "cols": len(distortion), "data": distortion},
+        "rectification_matrix": {"rows": 3, "cols": 3, "data": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]},
+        "projection_matrix": {"rows": 3, "cols": 4, "data": projection},
+    }
+
+
+def write_site(clip: Clip, folder: Path) -> Path:
+    """Write site file, calibration and the place of a fresh POI registry into `folder`. Returns the site file."""
+    (folder / CALIBRATION_FILE).write_text(yaml.safe_dump(calibration_content(clip)), encoding="utf-8")
+    site = folder / "site.yaml"
+    site.write_text(yaml.safe_dump(site_content(clip, folder / "pois.sqlite")), encoding="utf-8")
+    return site
