@@ -175,19 +175,23 @@ def test_a_film_is_published_whole_at_its_own_rate_and_its_end_is_said(endpoint:
 
 
 def test_lockstep_gives_equal_frames_in_two_runs_and_never_two_unanswered(endpoint: str, tmp_path: Path) -> None:
-    film = write_film(tmp_path / "film.mp4")
-    runs = []
+    film = write_film(tmp_path / "film.mp4", frames=70)
+    runs, infos = [], []
     for _ in range(2):
         arguments = ("--lockstep", "--set", f"source={film}")
         with camera_and_watcher(endpoint, tmp_path, *arguments, answers=True, stages=STAGES_BUT_CAMERA) as (_, watcher):
             wait_for(lambda: watcher.state() == "ended", "the end")
             runs.append(watcher.digest())
+            infos.append([info.model_copy(update={"instance": ""}) for info in watcher.infos])
             assert watcher.most_unanswered == 1
             assert watcher.infos[-1].lockstep
             assert watcher.healths[-1].counters.get("lockstep_unanswered", 0) == 0
-    assert [seq for seq, _, _ in runs[0]] == list(range(20))
+    assert [seq for seq, _, _ in runs[0]] == list(range(70))
     assert np.diff([stamp for _, stamp, _ in runs[0]]) == pytest.approx(40e6)
     assert runs[0] == runs[1]
+    assert infos[0] == infos[1]
+    assert [info.state for info in infos[0]] == ["streaming", "streaming", "ended"], "again after each 60 frames"
+    assert infos[0][-1].stamp_ns == runs[0][-1][1]
 
 
 def test_lockstep_goes_on_without_answers_and_counts_them(endpoint: str, tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ class Capture(threading.Thread):
         """Read and hand over. Raises SourceRefused where no picture can be used, SourceLost for a live source."""
         used = refused = bad_in_a_row = 0
         first_reason = ""
-        end = Became("ended", f"'{source.name}' was played to its end")
+        end = Became("ended")
         last_ns, period_ns = 0, round(1e9 / source.rate_hz) if source.rate_hz > 0 else 40_000_000
         while not self._stopped.is_set():
             try:

@@ -20,6 +20,7 @@ from .pacing import OwnRate
 from .sources import without_credentials
 
 INFO_PERIOD_S = 2.0
+INFO_PERIOD_FRAMES = 60
 STOP_WAIT_S = 1.0
 HEALTH: dict[str, HealthState] = {"retrying": "degraded", "failed": "failed"}
 
@@ -42,6 +43,8 @@ class CameraStage:
         self._readiness: Readiness | None = None
         self._hold_s = 0.0
         self._info_due_s = 0.0
+        self._frames_since_info = 0
+        self._stamp_ns = EPOCH_NS
         self._picture_s = 0.0
         node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
 
@@ -161,6 +164,8 @@ class CameraStage:
             if self._status.projects(encoded.width, encoded.height, picture.intrinsics):
                 self._node.note("intrinsics", f"intrinsics: {picture.intrinsics.source}")
             self._become(Became("streaming"))
+            self._stamp_ns = stamp_ns
+            self._frames_since_info += 1
             self._publish_info()  # before the frame where it is news: who reads the frame needs its intrinsics
             self._frames.put(frame)
         self._status.published(picture.seq)
@@ -177,7 +182,8 @@ class CameraStage:
         if self._readiness is None:
             self._readiness = Readiness(now_s, longest_s)
         alive = node.alive_stages() if node.lockstep else None
-        self._started = self._readiness.ready(alive, self._frames.matching(), now_s)
+        matching = self._frames.matching() and (self._infos.matching() or not node.lockstep)
+        self._started = self._readiness.ready(alive, matching, now_s)
         if self._started and self._readiness.timed_out(now_s):
             node.warn("start", f"{missing(alive)} within {longest_s:g} s; the recording starts all the same")
         return self._started
@@ -222,14 +228,25 @@ class CameraStage:
     # --- CameraInfo ---------------------------------------------------------------------------------------------------
 
     def _publish_info(self) -> None:
+        """Publish it where it changed, and now and then for who came late or lost it."""
         now_s = self._node.monotonic_s()
-        if self._status.changed or now_s >= self._info_due_s:
+        if self._info_is_due(now_s):
             self._infos.put(self._info())
             self._status.changed = False
+            self._frames_since_info = 0
+        if now_s >= self._info_due_s:
             self._info_due_s = now_s + INFO_PERIOD_S
 
+    def _info_is_due(self, now_s: float) -> bool:
+        state = self._status.state
+        if self._node.lockstep and state == "starting":
+            return False  # how often the start changes what is known depends on the machine; two runs are to be equal
+        if self._node.lockstep and state == "streaming":
+            return self._status.changed or self._frames_since_info >= INFO_PERIOD_FRAMES
+        return self._status.changed or now_s >= self._info_due_s
+
     def _info(self) -> CameraInfo:
-        return self._status.info(self._node.producer, self._node.now_ns())
+        return self._status.info(self._node.producer, self._stamp_ns if self._node.lockstep else self._node.now_ns())
 
     def _answer(self, _query: Query) -> list[tuple[str, Message]]:
         return [(topics.CAMERA_INFO.key(self._node.robot), self._info())]

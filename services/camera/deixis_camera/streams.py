@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import http.client
 import os
 import socket
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from .config import CameraConfig
@@ -16,6 +17,10 @@ from .sources import Picture, SourceBroken, SourceLost, SourceRefused, without_c
 
 PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
 PROBE_TIMEOUT_S = 2.0
+FFMPEG_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+RTSP_OPTIONS = "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay"
+"""Over TCP: no torn pictures. FFmpeg looks at a stream for about a second before it gives the first picture; without
+`nobuffer` the pictures of that second follow in a burst, old but stamped as new."""
 MISSING_SHARE = 0.02
 
 
@@ -37,18 +42,15 @@ class Stream:
         """Connect. Raises SourceLost with the cause, SourceRefused for a URL that names no host."""
         self.close()
         parts = _split(self._url, self.name)
-        if parts.scheme.startswith("rtsp"):
-            # Over TCP: no torn pictures. FFmpeg looks at a stream for about a second before it gives the first picture;
-            # without `nobuffer` the pictures of that second follow in a burst, old but stamped as new.
-            os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay")
         config = self._config
         try:
-            self._decoder = Decoder(
-                self._url,
-                open_timeout_s=config.open_timeout_s,
-                read_timeout_s=config.read_timeout_s,
-                threads=config.decoder_threads,
-            )
+            with _ffmpeg_options(RTSP_OPTIONS if parts.scheme.startswith("rtsp") else ""):
+                self._decoder = Decoder(
+                    self._url,
+                    open_timeout_s=config.open_timeout_s,
+                    read_timeout_s=config.read_timeout_s,
+                    threads=config.decoder_threads,
+                )
         except OSError:
             raise SourceLost(f"stream '{self.name}' {why_no_stream(parts)}") from None
         self._expected = self._decoder.expected_frames
@@ -80,6 +82,22 @@ class Stream:
             raise SourceLost(f"stream '{self.name}' ended, or gave no picture for {self._config.read_timeout_s:g} s")
         if self._expected - self._seq > max(1.0, MISSING_SHARE * self._expected):
             raise SourceBroken(f"stream '{self.name}' broke off: {self._seq} of about {self._expected} frames came")
+
+
+@contextlib.contextmanager
+def _ffmpeg_options(options: str) -> Iterator[None]:
+    """Have OpenCV open a video with these FFmpeg options, unless the user has set others.
+
+    OpenCV takes them from the environment alone. They are taken back: a file opened with them loses its last frame.
+    """
+    if not options or FFMPEG_OPTIONS in os.environ:
+        yield
+        return
+    os.environ[FFMPEG_OPTIONS] = options
+    try:
+        yield
+    finally:
+        os.environ.pop(FFMPEG_OPTIONS, None)
 
 
 def why_no_stream(parts: SplitResult) -> str:
