@@ -8,6 +8,7 @@ from collections import deque
 
 from deixis_schemas.messages import GestureKind, Phase, Side, Track
 
+from .bearing import HandSight
 from .config import GestureConfig
 from .fingertips import Finger, find_fingers
 from .hand import CHEST, Face, HandShape, cut_hand, unpack_contour
@@ -32,7 +33,7 @@ class Arm:
         self._resting_until_s = resting_until_s
         self._first_s: float | None = None
         self._leftness = 0.0
-        self._measures: deque[tuple[float, float]] = deque(maxlen=KEEP_MEASURES)
+        self._measures: deque[tuple[float, float, float]] = deque(maxlen=KEEP_MEASURES)
         self._place_px = (0.0, 0.0)
         self.track_id = -1
         self.seen_s = -math.inf
@@ -57,11 +58,11 @@ class Arm:
         return "left" if self._leftness > 0 else "right"
 
     @property
-    def measured(self) -> tuple[float, float] | None:
-        """Offset of the tip beside the face and visible length of the finger, face widths: medians of the stroke so far."""
+    def sight(self) -> HandSight | None:
+        """What the stroke so far shows of the hand: medians of its last frames; None without any."""
         if not self._measures:
             return None
-        return statistics.median(m[0] for m in self._measures), statistics.median(m[1] for m in self._measures)
+        return HandSight(*(statistics.median(values) for values in zip(*self._measures, strict=True)))
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""
@@ -83,7 +84,7 @@ class Arm:
             self._measures.clear()
         elif hand:
             self._stroke.add(time_s, vote(hand, self.fingers), self._was_raised_before_us())
-            self._measures.append((hand.tip[0], self.fingers[0].length if self.fingers else 0.0))
+            self._measures.append((hand.tip[0], self.fingers[0].length if self.fingers else 0.0, hand.palm_radius))
 
     def _was_raised_before_us(self) -> bool:
         """The hand was seen rising, or came into sight later than the person did."""

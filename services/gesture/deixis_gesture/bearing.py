@@ -22,11 +22,14 @@ REACH_ACROSS = 2.8
 REACH_ACROSS_SIGMA = 0.16
 OFFSET_SIGMA = 0.2
 LEAST_SIGMA_DEG = 8.0
-# Visible length of the index finger against the bearing: foreshortened in front, hidden by the fist behind.
-FINGER_BEARINGS = np.array([0.0, 20.0, 40.0, 80.0, 100.0, 115.0, 135.0, 180.0])
-FINGER_LENGTHS = np.array([0.08, 0.28, 0.52, 0.57, 0.34, 0.24, 0.08, 0.0])
-FINGER_SIGMA = 0.13
-FINGER_NONSENSE = 0.25
+# Visible length of the index finger against the bearing (foreshortened in front, hidden by the fist behind), and radius of the
+# fist (larger toward the camera). Eased from hands of the rendered clips; wide, for they say little about other hands.
+SHAPE_BEARINGS = np.array([0.0, 20.0, 40.0, 80.0, 100.0, 115.0, 135.0, 180.0])
+FINGER_LENGTHS = np.array([0.08, 0.28, 0.52, 0.56, 0.34, 0.24, 0.08, 0.0])
+FINGER_SIGMA = 0.11
+PALM_RADII = np.array([0.33, 0.31, 0.27, 0.24, 0.24, 0.23, 0.20, 0.19])
+PALM_SIGMA = 0.05
+OUTLIERS = 0.15
 GRID = np.arange(0.0, 151.0, 2.0)
 
 
@@ -39,10 +42,19 @@ class Bearing:
     mirrored: bool
 
 
-def estimate_bearing(offset: float, finger: float, distance: float, across: bool) -> Bearing:
-    """Bearing of a tip `offset` face widths beside the face, `finger` of it visible, person `distance` face widths away.
+@dataclass(frozen=True)
+class HandSight:
+    """A pointing hand as seen: tip beside the face (positive toward image right), lengths of finger and palm; face widths."""
 
-    `across`: the arm crosses the body. Raises ValueError for a distance that is not positive.
+    offset: float
+    finger: float
+    palm: float
+
+
+def estimate_bearing(sight: HandSight, distance: float, across: bool) -> Bearing:
+    """Bearing of a pointing hand of a person `distance` face widths away; `across`: the arm crosses the body.
+
+    Raises ValueError for a distance that is not positive.
     """
     if not distance > 0:
         raise ValueError(f"distance: {distance} face widths, must be positive")
@@ -51,15 +63,17 @@ def estimate_bearing(offset: float, finger: float, distance: float, across: bool
     depth = np.maximum(distance - reach * np.cos(radians), 0.3 * distance)
     expected = distance * reach * np.sin(radians) / depth
     # An offset beyond the model's largest is a long arm, not an impossible one.
-    seen = min(abs(offset), float(expected.max()))
+    seen = min(abs(sight.offset), float(expected.max()))
     sigma = np.hypot(OFFSET_SIGMA, spread * expected)
-    likelihood = np.exp(-0.5 * ((seen - expected) / sigma) ** 2) / sigma * _finger_likelihood(finger)
-    return _described(likelihood / likelihood.sum(), math.copysign(1.0, offset))
+    likelihood = np.exp(-0.5 * ((seen - expected) / sigma) ** 2) / sigma
+    likelihood *= _tail_normal(sight.finger, FINGER_LENGTHS, FINGER_SIGMA) * _tail_normal(sight.palm, PALM_RADII, PALM_SIGMA)
+    return _described(likelihood / likelihood.sum(), math.copysign(1.0, sight.offset))
 
 
-def _finger_likelihood(finger: float) -> np.ndarray:
-    expected = np.interp(GRID, FINGER_BEARINGS, FINGER_LENGTHS)
-    return np.asarray((1 - FINGER_NONSENSE) * np.exp(-0.5 * ((finger - expected) / FINGER_SIGMA) ** 2) + FINGER_NONSENSE)
+def _tail_normal(seen: float, means: np.ndarray, sigma: float) -> np.ndarray:
+    """Likelihood over the grid of a measure with these means at `SHAPE_BEARINGS`, and a share of outliers."""
+    expected = np.interp(GRID, SHAPE_BEARINGS, means)
+    return np.asarray((1 - OUTLIERS) * np.exp(-0.5 * ((seen - expected) / sigma) ** 2) + OUTLIERS)
 
 
 def _described(posterior: np.ndarray, sign: float) -> Bearing:

@@ -16,7 +16,7 @@ class GestureConfig(BaseModel):
     moving_speed: float = Field(
         default=1.7, gt=0, le=40, description="A still hand that becomes faster than this leaves, fw/s."
     )
-    speed_window_s: float = Field(default=0.1, gt=0, le=1, description="Time over which speed is measured.")
+    speed_window_s: float = Field(default=0.12, gt=0, le=1, description="Time over which speed is measured.")
     raised_below_face: float = Field(
         default=2.3, ge=0, le=6, description="A hand higher than this below the face is raised, fw."
     )

@@ -21,7 +21,6 @@ SAME_HAND = 1.2
 # A person seen for less than this may stand with resting hands raised: nobody saw them being raised.
 FIRST_LOOK_S = 0.7
 POINTING = ("point_left", "point_right", "invisible")
-RANK = {"stroke": 3, "preparation": 2, "retraction": 1, "idle": 0}
 
 
 class Person:
@@ -33,7 +32,7 @@ class Person:
         self._face: Face | None = None
         self._face_speed = 0.0
         self._face_s = -math.inf
-        self._first_s: float | None = None
+        self._resting_until_s = math.inf
         self._arms: list[Arm] = []
         self._current: Arm | None = None
 
@@ -43,16 +42,18 @@ class Person:
 
     def update(self, tracks: Sequence[Track], width: int, time_s: float) -> Gesture | None:
         """Gesture of the person in a frame `width` pixels wide; None without a usable face."""
-        self._first_s = time_s if self._first_s is None else self._first_s
+        if math.isinf(self._resting_until_s):
+            self._resting_until_s = time_s + FIRST_LOOK_S
         self._follow_face(tracks, time_s)
         if self._face is None:
             return None
         walking = self._face_speed > self._config.walking_speed
-        for arm, track in self._assigned([t for t in tracks if t.kind != "face" and t.observed and t.contour]):
+        hands = [track for track in tracks if track.kind != "face" and track.observed and track.contour]
+        for arm, track in self._assigned(hands, SAME_HAND * self._face.width_px):
             arm.update(track, self._face, time_s, walking)
         self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
         self._current = self._gesturing()
-        return self._spoken(self._current, width)
+        return self._spoken(self._current, self._face, width)
 
     def _follow_face(self, tracks: Sequence[Track], time_s: float) -> None:
         seen = [t for t in tracks if t.kind == "face" and t.bbox_px[2] >= LEAST_FACE_PX]
@@ -74,58 +75,55 @@ class Person:
         speed = abs(self._face.x_px - old.x_px) / passed / self._face.width_px
         self._face_speed += place * (speed - self._face_speed)
 
-    def _assigned(self, hands: Sequence[Track]) -> list[tuple[Arm, Track]]:
-        """Each hand with its arm: by the track's id, else the arm lost nearby, else a new one."""
-        assert self._face is not None
+    def _assigned(self, hands: Sequence[Track], near_px: float) -> list[tuple[Arm, Track]]:
+        """Each hand with its arm: by the track's id, else the arm lost within `near_px`, else a new one."""
         by_id = {arm.track_id: arm for arm in self._arms}
         pairs = [(by_id[t.track_id], t) for t in hands if t.track_id in by_id]
         free = [arm for arm in self._arms if all(arm is not taken for taken, _ in pairs)]
         for track in hands:
             if track.track_id in by_id:
                 continue
-            near = [arm for arm in free if arm.distance_px(track) <= SAME_HAND * self._face.width_px]
+            near = [arm for arm in free if arm.distance_px(track) <= near_px]
             if near:
                 arm = min(near, key=lambda a: a.distance_px(track))
                 free.remove(arm)
             else:
-                arm = Arm(self._config, self._resting_until())
+                arm = Arm(self._config, self._resting_until_s)
                 self._arms.append(arm)
             pairs.append((arm, track))
         return pairs
 
-    def _resting_until(self) -> float:
-        assert self._first_s is not None
-        return self._first_s + FIRST_LOOK_S
-
     def _gesturing(self) -> Arm | None:
-        """The hand to speak of: a stroke before a motion, a pointing before other strokes; the one so far among equals."""
-        return max(
-            self._arms,
-            key=lambda arm: (RANK[arm.phase], arm.gesture in POINTING, arm is self._current, arm.stretch),
-            default=None,
-        )
+        """The hand to speak of: one in a stroke, best a pointing; else the one spoken of so far while it moves."""
 
-    def _spoken(self, arm: Arm | None, width: int) -> Gesture:
-        if arm is None or arm.phase == "idle" or self._face is None:
+        def precedence(arm: Arm) -> tuple[bool, bool, bool, bool, float]:
+            in_stroke = arm.phase == "stroke"
+            pointing = in_stroke and arm.gesture in POINTING
+            return in_stroke, pointing, arm is self._current and arm.phase != "idle", arm.phase != "idle", arm.stretch
+
+        return max(self._arms, key=precedence, default=None)
+
+    def _spoken(self, arm: Arm | None, face: Face, width: int) -> Gesture:
+        if arm is None or arm.phase == "idle":
             return Gesture(person_id=self._person_id, phase="idle", gesture="none")
         gesture = arm.gesture if arm.phase == "stroke" else "none"
-        bearing = self._bearing(arm, width) if gesture in POINTING else None
+        bearing = _bearing(arm, self._config.focal_length_widths * width / face.width_px) if gesture in POINTING else None
         return Gesture(
             person_id=self._person_id,
             phase=arm.phase,
             gesture=gesture,
             hand=arm.side,
-            fingertips_px=[self._face.pixels(finger.tip) for finger in arm.fingers[:5]],
+            fingertips_px=[face.pixels(finger.tip) for finger in arm.fingers[:5]],
             bearing_deg=bearing.deg if bearing else None,
             bearing_sigma_deg=bearing.sigma_deg if bearing else None,
             bearing_mirrored=bearing.mirrored if bearing else False,
         )
 
-    def _bearing(self, arm: Arm, width: int) -> Bearing | None:
-        measured = arm.measured
-        if measured is None or self._face is None:
-            return None
-        offset, finger = measured
-        distance = self._config.focal_length_widths * width / self._face.width_px
-        own_side: Side = "left" if offset > 0 else "right"
-        return estimate_bearing(offset, finger, distance, across=arm.side is not None and own_side != arm.side)
+
+def _bearing(arm: Arm, distance: float) -> Bearing | None:
+    """Bearing of the arm's pointing, the person being `distance` face widths away."""
+    sight = arm.sight
+    if sight is None:
+        return None
+    towards: Side = "left" if sight.offset > 0 else "right"
+    return estimate_bearing(sight, distance, across=arm.side is not None and towards != arm.side)

@@ -6,6 +6,7 @@ face widths per second and measured over time, not frames, so that neither dista
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections import deque
 from itertools import combinations
@@ -16,9 +17,14 @@ from .config import GestureConfig
 
 # Slope between two samples closer than this is mostly noise.
 LEAST_SPAN_S = 0.02
-# Upward and downward speeds that tell a hand on its way from a hand at rest, face widths per second.
-RISING_SPEED = 0.6
+# Speeds that tell a hand on its way from a hand at rest, face widths per second: away from rest (up, or sideways off the body,
+# as an arm swings out before it rises), back to rest, and up again out of a retraction.
+LEAVING_SPEED = 0.7
 RESTING_SPEED = 0.7
+RAISING_AGAIN_SPEED = 2.0
+# A hand is under way when it is this far from where it rested, face widths; outlines at rest flicker by less.
+LEAVING_DISTANCE = 0.15
+REST_TIME_S = 0.5
 KEEP_SAMPLES = 64
 
 
@@ -57,21 +63,33 @@ class PhaseTracker:
         self.phase: Phase = "idle"
         self.rose = False
         self.raised = False
+        self._rest: tuple[float, float] | None = None
+        self._last_s = 0.0
 
     def update(self, time_s: float, point: tuple[float, float], place: tuple[float, float], walking: bool) -> Phase:
         """Advance to `time_s`: hand at `point` (face widths, fixed to the image), at `place` about the face's centre."""
         self._motion.add(time_s, point)
         velocity = self._motion.velocity
-        if velocity is None:
-            return self.phase
-        self.raised = self._is_raised(place)
-        following = "idle" if walking and self.phase != "stroke" else self._following(*velocity)
-        if following != self.phase:
-            self.rose = self.rose or following == "preparation"
-        if following == "idle":
-            self.rose = False
-        self.phase = following
-        return following
+        if velocity is not None:
+            self.raised = self._is_raised(place)
+            outward = velocity[0] if place[0] > 0 else -velocity[0]
+            leaving = max(-velocity[1], outward) if self._has_left_rest(point) else 0.0
+            self.phase = "idle" if walking and self.phase != "stroke" else self._following(*velocity, leaving)
+            self.rose = self.phase == "preparation" or (self.rose and self.phase != "idle")
+        self._follow_rest(time_s, point)
+        return self.phase
+
+    def _has_left_rest(self, point: tuple[float, float]) -> bool:
+        return self._rest is None or math.dist(self._rest, point) >= LEAVING_DISTANCE
+
+    def _follow_rest(self, time_s: float, point: tuple[float, float]) -> None:
+        """Where the idle hand is, slowly: breathing and a shifting outline are not under way."""
+        share = 1 - math.exp(-max(0.0, time_s - self._last_s) / REST_TIME_S)
+        self._last_s = time_s
+        if self._rest is None or self.phase != "idle":
+            self._rest = point
+            return
+        self._rest = self._rest[0] + share * (point[0] - self._rest[0]), self._rest[1] + share * (point[1] - self._rest[1])
 
     def _is_raised(self, place: tuple[float, float]) -> bool:
         """Higher than a resting hand; once raised a hand may sink a little before it counts as lowered."""
@@ -80,15 +98,20 @@ class PhaseTracker:
         limit = self._config.raised_beside_below_face if beside else self._config.raised_below_face
         return place[1] <= limit + slack
 
-    def _following(self, vx: float, vy: float) -> Phase:
-        speed = (vx * vx + vy * vy) ** 0.5
+    def _following(self, vx: float, vy: float, leaving: float) -> Phase:
+        speed = math.hypot(vx, vy)
         still = speed < (self._config.moving_speed if self.phase == "stroke" else self._config.still_speed)
         if self.raised and still:
             return "stroke"
-        if vy < -RISING_SPEED:
-            return "preparation"
         if self.phase in ("stroke", "retraction"):
+            if -vy > RAISING_AGAIN_SPEED:
+                return "preparation"
             return "idle" if not self.raised and speed < RESTING_SPEED else "retraction"
-        if self.phase == "preparation" and (self.raised or speed >= RESTING_SPEED):
-            return "preparation" if self.raised or vy < RISING_SPEED else "retraction"
-        return "preparation" if self.raised else "idle"
+        if self.phase == "preparation":
+            return self._after_preparation(vy, speed)
+        return "preparation" if self.raised or leaving > LEAVING_SPEED else "idle"
+
+    def _after_preparation(self, vy: float, speed: float) -> Phase:
+        if not self.raised and speed < RESTING_SPEED:
+            return "idle"
+        return "retraction" if vy > LEAVING_SPEED and not self.raised else "preparation"

@@ -26,7 +26,8 @@ UPRIGHT_DEG = 38.0
 UPRIGHT_AREA = 0.42
 UPRIGHT_REACH = 0.5
 UPRIGHT_BELOW_FACE = 1.3
-FINGER_UP_DEG = 65.0
+# A finger steeper than 65 degrees points at the ceiling: "wait", "one".
+STEEP = 2.14
 # A blob wider than this is no single hand (a hand before the face, or a wall of skin colour).
 LARGEST_PALM = 0.42
 LARGEST_AREA = 1.0
@@ -35,15 +36,21 @@ STRETCHED = 1.45
 NEAR_CAMERA_PALM = 0.29
 LOWEST_BELOW_FACE = 2.2
 HIGHEST_ABOVE_FACE = 0.6
+# An arm can hold its tip this far beside the face only if it is stretched sideways, which is a pointing posture whether or
+# not a finger stands out of the blob (a wall of skin colour swallows fingers, and tears others out of a fist).
+FAR_STRETCHED = 3.2
+FAR_STRETCHED_BELOW_FACE = (0.3, 3.2)
 # Nearer to the face's centre line than this the side is the finger's direction, not the hand's place.
 CENTRAL = 1.0
 FINGER_DIRECTION = 0.15
 
 RECENT_S = 0.5
 OPEN_SHARE = 0.3
-FINGER_SHARE = 0.3
+FINGER_SHARE = 0.25
 INVISIBLE_SHARE = 0.6
 CHANGE_SHARE = 0.75
+# A finger that comes out of the blur makes "invisible" more precise; it does not contradict it.
+REFINE_SHARE = 0.5
 
 
 def vote(hand: HandShape, fingers: Sequence[Finger]) -> Vote:
@@ -52,7 +59,11 @@ def vote(hand: HandShape, fingers: Sequence[Finger]) -> Vote:
         return "unclear"
     spread = sum(finger.length >= SPREAD_FINGER for finger in fingers)
     single = len(fingers) > 0 and fingers[0].length >= LONG_FINGER and spread == 1
-    if spread >= 2 or len(fingers) >= 4 or (_is_upright_palm(hand) and not single):
+    if spread >= 3 or len(fingers) >= 4 or (_is_upright_palm(hand) and not single):
+        return "other"
+    if _is_stretched_sideways(hand):
+        return "point_left" if hand.tip[0] > 0 else "point_right"
+    if spread == 2:
         return "other"
     if fingers and fingers[0].length >= POINTING_FINGER:
         return _pointing(hand, fingers[0])
@@ -68,6 +79,11 @@ def _is_upright_palm(hand: HandShape) -> bool:
     )
 
 
+def _is_stretched_sideways(hand: HandShape) -> bool:
+    highest, lowest = FAR_STRETCHED_BELOW_FACE
+    return abs(hand.tip[0]) >= FAR_STRETCHED and highest <= hand.centroid[1] <= lowest
+
+
 def _is_held_out(hand: HandShape) -> bool:
     x, y = hand.centroid
     if not -HIGHEST_ABOVE_FACE <= y <= LOWEST_BELOW_FACE:
@@ -77,7 +93,7 @@ def _is_held_out(hand: HandShape) -> bool:
 
 def _pointing(hand: HandShape, finger: Finger) -> Vote:
     dx, dy = finger.tip[0] - hand.palm[0], finger.tip[1] - hand.palm[1]
-    if -dy > abs(dx) * 2.1445:  # tan(FINGER_UP_DEG)
+    if -dy > abs(dx) * STEEP:
         return "other"
     x = finger.tip[0] if abs(hand.palm[0]) >= CENTRAL else dx
     if abs(x) < FINGER_DIRECTION:
@@ -105,7 +121,9 @@ class StrokeGesture:
             return self.gesture
         recent = [v for t, v in self._votes if self.gesture == "none" or time_s - t <= RECENT_S]
         winner, share = _winner(recent)
-        if self.gesture == "none" or (share >= CHANGE_SHARE and time_s - self._votes[0][0] >= RECENT_S):
+        refined = self.gesture == "invisible" and winner in ("point_left", "point_right")
+        enough = REFINE_SHARE if refined else CHANGE_SHARE
+        if self.gesture == "none" or (share >= enough and time_s - self._began_s >= RECENT_S):
             self.gesture = winner
         return self.gesture
 
