@@ -15,18 +15,23 @@ from .options import CommandError
 GROUP = "deixis.commands"
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line with all subcommands that are installed here."""
+def parser(wanted: str | None = None) -> argparse.ArgumentParser:
+    """The command line with all subcommands that are installed here; with the `wanted` one alone where it is one of them."""
     top = argparse.ArgumentParser(prog="deixis", description="Tells a robot which thing a person is pointing at.")
     subparsers = top.add_subparsers(metavar="COMMAND", required=True)
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        entry.load()(subparsers)
+    installed = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    for entry in [entry for entry in installed if entry.name == wanted] or installed:
+        try:
+            entry.load()(subparsers)
+        except ImportError as error:  # a command that cannot be loaded is no reason to lose the others
+            print(f"deixis: the command '{entry.name}' is not available: {error}", file=sys.stderr)
     return top
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command. Exit status 0 when it did its job; 1 with the cause on standard error; 2 for bad usage."""
-    given = parser().parse_args(argv)
+    argv = sys.argv[1:] if argv is None else argv
+    given = parser(argv[0] if argv else None).parse_args(argv)
     setup_logging()
     try:
         return int(given.run(given))

@@ -81,9 +81,11 @@ def exit_status(result: PlayResult, *, endless: bool, expected: str | None) -> i
 
 
 def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -> None:
-    """The final answers, and how the run fared, as text."""
+    """The final answers, and how the run fared, as text; nothing for a source that gave no frame."""
     for target in result.targets:
         console.out(_answer_text(target, names), highlight=False)
+    if not result.frames:
+        return
     if not result.targets:
         console.out("\nNobody was seen pointing.", highlight=False)
     counts = result.counters

@@ -31,7 +31,8 @@ class Summary:
         self.seq = -1
         self._first_ns: int | None = None
         self._frames = 0
-        self._frames_since: tuple[int, int] | None = None
+        self._timed = 0
+        self._since: tuple[int, int] | None = None
         self._rate_hz = 0.0
         self._answers = 0
         self._health: dict[str, Health] = {}
@@ -48,6 +49,8 @@ class Summary:
             self.words["gesture"] = wording.gestures(message)
         elif isinstance(message, Belief):
             self._answers += 1
+            if not self._frames:
+                self._keep_time(message)  # who looks on from afar hears no frames
             self.words["fusion"] = wording.belief(message, self.names)
         elif isinstance(message, Target):
             self.target = message
@@ -64,7 +67,7 @@ class Summary:
 
     def drops(self) -> int:
         """Frames that got no answer so far, less the one on its way."""
-        return max(0, self._frames - self._answers - 1) if self._answers else 0
+        return max(0, self._frames - self._answers - 1) if self._answers and self._frames else 0
 
     def faults(self) -> list[str]:
         """Stages that say that they are not well."""
@@ -72,19 +75,24 @@ class Summary:
 
     def line(self) -> str:
         """Everything in one line."""
-        frame = f"{self.clip_s:6.1f} s  frame {self.seq}  {self._rate_hz:.0f}/s  {self.drops()} dropped"
+        frame = f"{self.clip_s:6.1f} s  frame {self.seq}  {self._rate_hz:.0f}/s"
+        frame += f"  {self.drops()} dropped" if self._frames else ""
         return " | ".join(
             [frame, *(self.words[stage] for stage in ("tracker", "headpose", "gesture", "fusion") if stage in self.words)]
         )
 
-    def _hear_frame(self, frame: OfFrame) -> None:
-        if self._first_ns is None or frame.stamp_ns < self._first_ns:
-            self._first_ns, self._frames_since = frame.stamp_ns, None
+    def _hear_frame(self, frame: Frame) -> None:
         self._frames += 1
-        self.seq = frame.seq
-        self.clip_s = (frame.stamp_ns - self._first_ns) / 1e9
-        since = self._frames_since or (frame.stamp_ns, self._frames)
-        if frame.stamp_ns - since[0] >= 1_000_000_000:
-            self._rate_hz = (self._frames - since[1]) * 1e9 / (frame.stamp_ns - since[0])
-            since = (frame.stamp_ns, self._frames)
-        self._frames_since = since
+        self._keep_time(frame)
+
+    def _keep_time(self, message: OfFrame) -> None:
+        if self._first_ns is None or message.stamp_ns < self._first_ns:
+            self._first_ns, self._since = message.stamp_ns, None
+        self.seq = message.seq
+        self.clip_s = (message.stamp_ns - self._first_ns) / 1e9
+        self._timed += 1
+        since_ns, before = self._since or (message.stamp_ns, self._timed)
+        if message.stamp_ns - since_ns >= 1_000_000_000:
+            self._rate_hz = (self._timed - before) * 1e9 / (message.stamp_ns - since_ns)
+            since_ns, before = message.stamp_ns, self._timed
+        self._since = since_ns, before

@@ -70,18 +70,33 @@ def load_site(path: Path) -> Site:
         raise SiteError(f"site file {path}: {say(error)}") from None
 
 
+def load_pois(path: Path) -> list[SitePoi]:
+    """The POIs of a site file, or of a file that is a list of POIs. Raises SiteError with file, field and cause."""
+    content = _load_yaml(path, "POI file")
+    if isinstance(content, dict):
+        return load_site(path).pois
+    try:
+        return Site.model_validate({"pois": content or []}).pois
+    except ValidationError as error:
+        raise SiteError(f"POI file {path}: {say(error)}") from None
+
+
 def read_yaml(path: Path, what: str) -> dict[str, Any]:
     """The mapping in a YAML file; an empty file is an empty mapping. Raises SiteError."""
-    try:
-        if path.stat().st_size > MAX_SITE_BYTES:
-            raise SiteError(f"{what} {path}: larger than {MAX_SITE_BYTES} bytes")
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SiteError(f"{what} {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise SiteError(f"{what} {path}: not YAML: {' '.join(str(error).split())[:300]}") from None
+    content = _load_yaml(path, what)
     if content is None:
         return {}
     if not isinstance(content, dict):
         raise SiteError(f"{what} {path}: not a mapping but {type(content).__name__}")
     return {str(key): value for key, value in content.items()}
+
+
+def _load_yaml(path: Path, what: str) -> Any:
+    try:
+        if path.stat().st_size > MAX_SITE_BYTES:
+            raise SiteError(f"{what} {path}: larger than {MAX_SITE_BYTES} bytes")
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SiteError(f"{what} {path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise SiteError(f"{what} {path}: not YAML: {' '.join(str(error).split())[:300]}") from None

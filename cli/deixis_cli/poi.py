@@ -1,0 +1,156 @@
+"""`deixis poi`: look at the registry of points of interest and edit it, each edit acknowledged once it is on disk."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import zenoh
+from deixis_runtime.session import open_client
+from deixis_runtime.site import SiteError, load_pois
+from deixis_schemas import codec, topics
+from deixis_schemas.messages import Poi
+
+from .gets import get_all, get_state
+from .options import CommandError, add_connect, add_json, add_robot
+
+DEADLINE_S = 5.0
+PAUSE_S = 0.1
+
+
+def register(subparsers: Any) -> None:
+    """Add the command with its own subcommands."""
+    parser = subparsers.add_parser("poi", help="the registry of points of interest", description=__doc__)
+    actions = parser.add_subparsers(metavar="ACTION", required=True)
+    _action(actions, "list", "show all", run_list)
+    add = _action(actions, "add", "add one, or replace the one of this id", run_add)
+    _place(add)
+    add.add_argument("--name", default="", help="for people")
+    add.add_argument("--extent", type=float, default=0.5, metavar="METRES", help="size across (default: %(default)s)")
+    add.add_argument("--tag", action="append", default=[], help="may be given again")
+    _place(_action(actions, "move", "give one another position", run_move))
+    _action(actions, "remove", "remove one", run_remove).add_argument("poi_id", metavar="ID", type=poi_id)
+    many = _action(actions, "import", "add or replace those of a site file, or of a YAML or JSON list", run_import)
+    many.add_argument("file", type=Path, metavar="FILE")
+
+
+def run_list(given: argparse.Namespace) -> int:
+    """Show all POIs."""
+    with open_client(given.connect, shared_memory=False) as session:
+        _show(_all_pois(session, given), given)
+    return 0
+
+
+def run_add(given: argparse.Namespace) -> int:
+    """Add or replace one POI."""
+    poi = _checked(poi_id=given.poi_id, name=given.name, position_m=given.position_m, extent_m=given.extent, tags=given.tag)
+    with open_client(given.connect, shared_memory=False) as session:
+        _show([_edit(session, given, poi.poi_id, poi)], given)
+    return 0
+
+
+def run_move(given: argparse.Namespace) -> int:
+    """Give one POI another position."""
+    with open_client(given.connect, shared_memory=False) as session:
+        found = {poi.poi_id: poi for poi in _all_pois(session, given)}
+        if given.poi_id not in found:
+            raise CommandError(f"poi_id: there is no POI '{given.poi_id}'; use 'deixis poi add'")
+        poi = _checked(**{**found[given.poi_id].model_dump(), "position_m": given.position_m})
+        _show([_edit(session, given, poi.poi_id, poi)], given)
+    return 0
+
+
+def run_remove(given: argparse.Namespace) -> int:
+    """Remove one POI; shows it as it was."""
+    with open_client(given.connect, shared_memory=False) as session:
+        _show([_edit(session, given, given.poi_id, None)], given)
+    return 0
+
+
+def run_import(given: argparse.Namespace) -> int:
+    """Add or replace the POIs of a file: all are checked before the first is sent."""
+    try:
+        pois = load_pois(given.file)
+    except SiteError as error:
+        raise CommandError(str(error)) from None
+    if not pois:
+        raise CommandError(f"{given.file}: holds no POIs")
+    with open_client(given.connect, shared_memory=False) as session:
+        _show([_edit(session, given, poi.poi_id, Poi.model_validate(poi.model_dump())) for poi in pois], given)
+    return 0
+
+
+def poi_id(text: str) -> str:
+    """An id, checked, for it becomes the last part of a key. Raises argparse.ArgumentTypeError."""
+    if not re.fullmatch(r"[A-Za-z0-9_.\-]{1,64}", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not an id of letters, digits, '_', '.' and '-'")
+    return text
+
+
+def _edit(session: zenoh.Session, given: argparse.Namespace, which: str, poi: Poi | None) -> Poi:
+    """Put a POI, or delete it where `poi` is none, and wait for the stored one. Raises CommandError."""
+    selector = f"{topics.POI.key(given.robot, id=which)}?op={'delete' if poi is None else 'put'}"
+    payload = codec.encode(poi) if poi is not None else None
+    encoding = codec.encoding_of(Poi) if poi is not None else None
+    deadline_s = time.monotonic() + DEADLINE_S
+    while True:
+        stored, refused = get_all(session, selector, Poi, payload=payload, encoding=encoding)
+        if refused:
+            raise CommandError(f"{which}: {refused[0].reason}")
+        if stored:
+            return stored[0][1]
+        # A get made just as fusion comes up or restarts comes back empty.
+        if time.monotonic() > deadline_s:
+            raise CommandError(_nobody(given))
+        time.sleep(PAUSE_S)
+
+
+def _all_pois(session: zenoh.Session, given: argparse.Namespace) -> list[Poi]:
+    """All POIs. An empty registry gives no reply, as an absent fusion does, so its state is asked. Raises CommandError."""
+    deadline_s = time.monotonic() + DEADLINE_S
+    while True:
+        state = get_state(session, given.robot)
+        if state is not None:
+            return state.pois
+        if time.monotonic() > deadline_s:
+            raise CommandError(_nobody(given))
+        time.sleep(PAUSE_S)
+
+
+def _nobody(given: argparse.Namespace) -> str:
+    return f"fusion of robot '{given.robot}' does not answer at {given.connect}; 'deixis doctor' tells why"
+
+
+def _checked(**content: Any) -> Poi:
+    try:
+        return codec.validate(Poi, content)
+    except codec.CodecError as error:
+        raise CommandError(str(error)) from None
+
+
+def _show(pois: list[Poi], given: argparse.Namespace) -> None:
+    if given.json:
+        print(json.dumps([poi.model_dump(mode="json") for poi in pois]))
+        return
+    for poi in pois:
+        x, y, z = poi.position_m
+        tags = f"  [{', '.join(poi.tags)}]" if poi.tags else ""
+        print(f"{poi.poi_id:<16} {x:8.2f} {y:8.2f} {z:8.2f} m  {poi.extent_m:5.2f} m  {poi.name}{tags}")
+
+
+def _action(actions: Any, name: str, text: str, run: Any) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = actions.add_parser(name, help=text, description=text)
+    add_robot(parser)
+    add_connect(parser)
+    add_json(parser, "print a JSON list of the POIs shown")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _place(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("poi_id", metavar="ID", type=poi_id)
+    parser.add_argument("position_m", type=float, nargs=3, metavar=("X", "Y", "Z"), help="in the map frame, metres")

@@ -1,0 +1,109 @@
+"""A running system as seen from outside: who is alive, and what each stage says of itself."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Literal
+
+import zenoh
+from deixis_schemas import topics
+from deixis_schemas.messages import CameraInfo, Health, State
+
+from .gets import get_all, get_healths, get_state
+
+TOKENS_TIMEOUT_S = 2.0
+
+Standing = Literal["ok", "degraded", "failed", "hung", "no token"]
+
+
+@dataclass(frozen=True)
+class StageProcess:
+    """One process of a stage. alive: its liveliness token stands. cpu_percent: over the time looked at, none if unknown."""
+
+    stage: str
+    instance: str
+    alive: bool
+    health: Health | None
+    cpu_percent: float | None = None
+    clock_ahead_s: float | None = None
+
+    @property
+    def standing(self) -> Standing:
+        """What the stage says, or that it says nothing (`hung`), or that it has no token (not one of the runtime's)."""
+        if self.health is None:
+            return "hung"
+        return self.health.state if self.alive else "no token"
+
+
+@dataclass(frozen=True)
+class System:
+    """All that is known of one robot's system."""
+
+    robot: str
+    processes: list[StageProcess] = field(default_factory=list)
+    camera: CameraInfo | None = None
+    state: State | None = None
+
+    def missing(self) -> list[str]:
+        """Stages of the contract without a process."""
+        present = {process.stage for process in self.processes}
+        return [stage for stage in topics.STAGES if stage not in present]
+
+    def doubled(self) -> list[str]:
+        """Keys with more than one producer, as sentences."""
+        found: dict[str, set[str]] = {}
+        for process in self.processes:
+            found.setdefault(f"stage {process.stage}", set()).add(f"{process.stage}/{process.instance}")
+            for item in process.health.inputs if process.health else []:
+                found.setdefault(f"key {item.key}", set()).update(item.producers)
+        return [f"{what} has {len(who)} producers: {', '.join(sorted(who))}" for what, who in found.items() if len(who) > 1]
+
+
+def look(session: zenoh.Session, robot: str, cpu_over_s: float = 0.0) -> System:
+    """Ask a system how it is; with `cpu_over_s` twice, that far apart, to see the processor time used in between."""
+    tokens = alive_processes(session, robot)
+    before = {(item.stage, item.instance): item for item in get_healths(session, robot)} if cpu_over_s else {}
+    if before:
+        time.sleep(cpu_over_s)
+    asked_ns = time.time_ns()
+    healths = {(item.stage, item.instance): item for item in get_healths(session, robot)}
+    elapsed_s = (time.time_ns() - asked_ns) / 1e9
+    processes = [
+        StageProcess(
+            *who,
+            alive=who in tokens,
+            health=healths.get(who),
+            cpu_percent=_cpu_percent(before.get(who), healths.get(who)),
+            clock_ahead_s=_clock_ahead_s(healths.get(who), asked_ns, elapsed_s),
+        )
+        for who in sorted(tokens | set(healths), key=_in_order)
+    ]
+    cameras, _ = get_all(session, topics.CAMERA_INFO.key(robot), CameraInfo)
+    return System(robot, processes, cameras[0][1] if cameras else None, get_state(session, robot))
+
+
+def alive_processes(session: zenoh.Session, robot: str) -> set[tuple[str, str]]:
+    """(stage, instance) of the liveliness tokens that stand."""
+    replies = session.liveliness().get(topics.alive_key(robot, "*", "*"), timeout=TOKENS_TIMEOUT_S)
+    keys = [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
+    return {(key[-2], key[-1]) for key in keys}
+
+
+def _in_order(who: tuple[str, str]) -> tuple[int, str, str]:
+    stage, instance = who
+    return topics.STAGES.index(stage) if stage in topics.STAGES else len(topics.STAGES), stage, instance
+
+
+def _cpu_percent(before: Health | None, after: Health | None) -> float | None:
+    if before is None or after is None or after.uptime_s <= before.uptime_s:
+        return None
+    return 100 * (after.cpu_s - before.cpu_s) / (after.uptime_s - before.uptime_s)
+
+
+def _clock_ahead_s(health: Health | None, asked_ns: int, elapsed_s: float) -> float | None:
+    """How far the clock of the stage's host is ahead of ours, as far as the answer's delay lets us tell: else 0."""
+    if health is None:
+        return None
+    ahead_s = (health.stamp_ns - asked_ns) / 1e9
+    return min(ahead_s, 0.0) if ahead_s < elapsed_s else ahead_s - elapsed_s
