@@ -73,7 +73,7 @@ def draw_tracks(image: Any, tracks: dict[str, Any]) -> None:
     """Outlines and boxes."""
     for track in tracks["tracks"]:
         colour = COLOURS[track["kind"]]
-        outline = np.frombuffer(base64.b64decode(track["contour"]), "<i2").reshape(-1, 1, 2).astype(np.int32)
+        outline = np.frombuffer(base64.urlsafe_b64decode(track["contour"]), "<i2").reshape(-1, 1, 2).astype(np.int32)
         if len(outline):
             cv2.polylines(image, [outline * 2], True, colour, 2, cv2.LINE_AA)
         x, y, w, h = (round(2 * v) for v in track["bbox_px"])
