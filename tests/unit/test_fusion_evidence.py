@@ -28,6 +28,7 @@ from hypothesis import strategies as st
 
 CONFIG = FusionConfig()
 PAPER = FusionConfig(rules="paper")
+LIMITS = (40.0, 140.0)
 AROUND = (-130.0, -105.0, -81.0, -56.0, -31.0, 0.0, 31.0, 56.0, 81.0, 105.0, 130.0)
 bearings = st.lists(st.floats(-179, 179), min_size=1, max_size=12)
 gestures = st.sampled_from(["point_left", "invisible", "point_right"])
@@ -50,24 +51,24 @@ def test_every_column_of_table_1_sums_to_one() -> None:
 def test_equation_16_counts_the_pois_of_each_region() -> None:
     # Eight POIs as in figure 5: two on the left, two on the right, four in the centre (front and back).
     degrees = [10, -20, 60, 100, -60, -100, 160, 175]
-    assignment = paper_hand_assignment("point_left", degrees, PAPER)
+    assignment = paper_hand_assignment("point_left", degrees, LIMITS)
     left, center = as_set([2, 3]), as_set([0, 1, 6, 7])
     total = 0.90 * 2 / 8 + 0.05 * 4 / 8
     assert assignment.masses == {left: pytest.approx(0.90 * 2 / 8 / total), center: pytest.approx(0.05 * 4 / 8 / total)}
 
 
 def test_an_invisible_gesture_speaks_for_the_centre() -> None:
-    assignment = paper_hand_assignment("invisible", [0, 60, -60], PAPER)
+    assignment = paper_hand_assignment("invisible", [0, 60, -60], LIMITS)
     assert assignment.masses[0b001] == pytest.approx(0.9 / 1.1)
 
 
 def test_a_gesture_that_no_poi_explains_is_vacuous() -> None:
-    assert paper_hand_assignment("point_left", [-60, -90], PAPER).unknown == 1.0
+    assert paper_hand_assignment("point_left", [-60, -90], LIMITS).unknown == 1.0
 
 
 @given(bearings, gestures)
 def test_equation_16_gives_an_assignment_for_any_arrangement(degrees: list[float], gesture: PointingGesture) -> None:
-    masses = paper_hand_assignment(gesture, degrees, PAPER).masses
+    masses = paper_hand_assignment(gesture, degrees, LIMITS).masses
     assert math.fsum(masses.values()) == pytest.approx(1.0)
 
 
@@ -91,8 +92,8 @@ def test_the_papers_choice_is_the_union_of_the_largest_focal_sets() -> None:
 
 def test_without_a_bearing_our_hand_agrees_with_equation_16_far_from_the_borders() -> None:
     degrees = (0.0, 90.0, -90.0, 180.0)
-    ours = hand_assignment(HandObservation("point_left"), seen(*degrees), CONFIG)
-    paper = paper_hand_assignment("point_left", degrees, CONFIG).discounted(CONFIG.hand_discount)
+    ours = hand_assignment(HandObservation("point_left"), seen(*degrees), FusionConfig(hand_miss=0.1))
+    paper = paper_hand_assignment("point_left", degrees, LIMITS).discounted(CONFIG.hand_discount)
     assert ours.pignistic() == pytest.approx(paper.pignistic(), abs=0.03)
 
 

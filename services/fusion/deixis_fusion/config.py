@@ -38,14 +38,15 @@ class FusionConfig(BaseModel):
     wall_clearance_m: float = Field(default=0.15, ge=0, le=10, description="A POI this far behind a wall's face hangs on it.")
 
     # hand, eq. 16 and table 1
-    phi_h_min_deg: float = Field(
-        default=40, ge=0, le=180, description="Smallest bearing at which a pointing hand is recognised."
+    phi_h_min_deg: float = Field(default=40, ge=0, le=180, description="paper: least bearing at which a hand is recognised.")
+    phi_h_max_deg: float = Field(default=140, ge=0, le=180, description="paper: largest bearing at which a hand is recognised.")
+    hand_min_deg: float = Field(default=25, ge=0, le=180, description="deixis: least bearing at which a hand is recognised.")
+    hand_max_deg: float = Field(default=150, ge=0, le=180, description="deixis: largest bearing at which a hand is recognised.")
+    hand_soft_deg: float = Field(default=15, gt=0, le=90, description="deixis: width of the borders of that range.")
+    hand_miss: float = Field(
+        default=0.25, ge=0, le=1, description="deixis: probability that a finger within that range is missed."
     )
-    phi_h_max_deg: float = Field(
-        default=140, ge=0, le=180, description="Largest bearing at which a pointing hand is recognised."
-    )
-    phi_h_soft_deg: float = Field(default=15, gt=0, le=90, description="deixis: width of the border of that range.")
-    hand_refinement: float = Field(default=0.8, ge=0, le=1, description="deixis: part of each region's mass given to its POIs.")
+    hand_refinement: float = Field(default=0.9, ge=0, le=1, description="deixis: part of each region's mass given to its POIs.")
     hand_discount: float = Field(default=0.08, ge=0, le=1, description="deixis: mass kept on the whole frame.")
     hand_sigma_floor_deg: float = Field(default=6, ge=0, le=90, description="deixis: error of the hand's bearing at least.")
     hand_outlier: float = Field(
@@ -57,10 +58,10 @@ class FusionConfig(BaseModel):
     paper_head_sigma_deg: float = Field(default=10, gt=0, le=90, description="paper: stands for the confusions of fig. 6.")
     head_range_deg: float = Field(default=95, gt=0, le=180, description="deixis: yaw beyond which a head is out of range.")
     head_range_soft_deg: float = Field(default=10, gt=0, le=90, description="deixis: width of the border of that range.")
-    head_sigma_deg: float = Field(default=5, gt=0, le=90, description="deixis: how exactly people turn the head.")
+    head_sigma_deg: float = Field(default=4, gt=0, le=90, description="deixis: how exactly people turn the head.")
     head_gain_min: float = Field(default=0.65, gt=0, le=1.5, description="deixis: smallest part of the way that heads turn.")
     head_gain_max: float = Field(default=1.0, gt=0, le=1.5, description="deixis: largest part of the way that heads turn.")
-    head_full_turn: float = Field(default=0.5, ge=0, le=1, description="deixis: probability that a head turns the whole way.")
+    head_full_turn: float = Field(default=0.65, ge=0, le=1, description="deixis: probability that a head turns the whole way.")
     head_overshoot_deg: float = Field(default=2, ge=0, le=20, description="deixis: a whole turn goes this much too far.")
     head_at_robot: float = Field(default=0.15, ge=0, lt=1, description="deixis: probability of looking at the robot instead.")
     head_outlier: float = Field(default=0.05, gt=0, lt=1, description="deixis: probability that the yaw is nonsense.")
@@ -80,7 +81,7 @@ class FusionConfig(BaseModel):
     max_evidence_s: float = Field(default=5, gt=0, le=600, description="Of a long stroke the last seconds count.")
 
     # answer
-    tie_margin: float = Field(default=0.1, ge=0, le=1, description="deixis: pignistic differences below this are ties.")
+    tie_margin: float = Field(default=0.08, ge=0, le=1, description="deixis: pignistic differences below this are ties.")
     max_ties: int = Field(default=3, ge=1, le=64, description="deixis: with more POIs tied, abstain.")
     max_conflict: float = Field(default=0.97, gt=0, le=1, description="deixis: with more conflict, abstain.")
     max_unknown: float = Field(default=0.9, gt=0, le=1, description="deixis: with more mass on the whole frame, abstain.")
@@ -89,6 +90,8 @@ class FusionConfig(BaseModel):
     def _ranges_are_ranges(self) -> FusionConfig:
         if self.phi_h_min_deg >= self.phi_h_max_deg:
             raise ValueError("phi_h_max_deg: must be larger than phi_h_min_deg")
+        if self.hand_min_deg >= self.hand_max_deg:
+            raise ValueError("hand_max_deg: must be larger than hand_min_deg")
         if self.head_gain_min >= self.head_gain_max:
             raise ValueError("head_gain_max: must be larger than head_gain_min")
         return self

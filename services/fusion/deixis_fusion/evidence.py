@@ -69,20 +69,23 @@ class HeadObservation:
 # --- the paper's rules ------------------------------------------------------------------------------------------------
 
 
-def region_of(bearing_deg: float, config: FusionConfig) -> Region:
-    """The region of section 6.1 that a POI is in: where its pointing hand is recognised as left or right, or not at all."""
-    if config.phi_h_min_deg <= abs(bearing_deg) <= config.phi_h_max_deg:
+def region_of(bearing_deg: float, range_deg: tuple[float, float]) -> Region:
+    """The region of section 6.1 that a POI is in: within `range_deg` its pointing hand is recognised, as left or right."""
+    if range_deg[0] <= abs(bearing_deg) <= range_deg[1]:
         return "left" if bearing_deg > 0 else "right"
     return "center"
 
 
-def paper_hand_assignment(gesture: PointingGesture, bearings_deg: Sequence[float], config: FusionConfig) -> BeliefAssignment:
+def paper_hand_assignment(
+    gesture: PointingGesture, bearings_deg: Sequence[float], range_deg: tuple[float, float]
+) -> BeliefAssignment:
     """Eq. 16: masses of the sets of POIs on the left, on the right and in the centre, given the recognised gesture.
 
-    P(G) is the share of the POIs within region G. Vacuous where the gesture is impossible for every POI there is.
+    P(G) is the share of the POIs within region G; `range_deg` is (phi_h-min, phi_h-max). Vacuous where the gesture is
+    impossible for every POI there is.
     """
     weights: dict[int, float] = {}
-    for region, hypotheses in _regions(bearings_deg, config).items():
+    for region, hypotheses in _regions(bearings_deg, range_deg).items():
         weights[as_set(hypotheses)] = TABLE_1[gesture][region] * len(hypotheses) / len(bearings_deg)
     return normalised(len(bearings_deg), weights)
 
@@ -135,19 +138,19 @@ def hand_assignment(hand: HandObservation, seen: Sequence[Candidate], config: Fu
     if hand.bearing_deg is not None:
         weights = [w * _hand_likelihood(hand, candidate, config) for w, candidate in zip(weights, seen, strict=True)]
     single = normalised(size, {1 << i: weight for i, weight in enumerate(weights)})
-    sets = paper_hand_assignment(hand.gesture, bearings, config)
+    sets = paper_hand_assignment(hand.gesture, bearings, (config.hand_min_deg, config.hand_max_deg))
     return _mixed(single, sets, config.hand_refinement).discounted(_rate(config.hand_discount, hand.agreement))
 
 
 def _gesture_likelihood(gesture: PointingGesture, bearing_deg: float, config: FusionConfig) -> float:
     """P(gesture | bearing): table 1's columns, blended over the borders of the hand's range instead of cut there."""
     size = abs(bearing_deg)
-    inside = _rise(size - config.phi_h_min_deg, config.phi_h_soft_deg) * _rise(
-        config.phi_h_max_deg - size, config.phi_h_soft_deg
-    )
-    row = TABLE_1[gesture]
+    soft = config.hand_soft_deg
+    inside = _rise(size - config.hand_min_deg, soft) * _rise(config.hand_max_deg - size, soft)
+    row, miss = TABLE_1[gesture], config.hand_miss
     left = _rise(math.sin(math.radians(bearing_deg)), SIDE_BORDER)
-    beside = left * row["left"] + (1 - left) * row["right"]
+    # Table 1 is of fingers seen well; how often one is missed within its range depends on the camera.
+    beside = {"point_left": (1 - miss) * left, "point_right": (1 - miss) * (1 - left), "invisible": miss}[gesture]
     # In the centre table 1 gives both sides .05 on average: more to a POI that lies a little to the side of the gesture.
     agrees = {"point_left": 2 * left, "point_right": 2 * (1 - left), "invisible": 1.0}[gesture]
     return max(WRONG_SIDE, inside * beside + (1 - inside) * row["center"] * agrees)
@@ -260,10 +263,10 @@ def wrapped_deg(angle: float) -> float:
     return (angle + 180.0) % FULL_CIRCLE_DEG - 180.0
 
 
-def _regions(bearings_deg: Sequence[float], config: FusionConfig) -> dict[Region, list[int]]:
+def _regions(bearings_deg: Sequence[float], range_deg: tuple[float, float]) -> dict[Region, list[int]]:
     found: dict[Region, list[int]] = {"left": [], "center": [], "right": []}
     for i, bearing in enumerate(bearings_deg):
-        found[region_of(bearing, config)].append(i)
+        found[region_of(bearing, range_deg)].append(i)
     return {region: hypotheses for region, hypotheses in found.items() if hypotheses}
 
 

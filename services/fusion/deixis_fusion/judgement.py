@@ -43,7 +43,8 @@ def _hand(seen: Sequence[Candidate], hand: HandObservation | None, config: Fusio
     if hand is None:
         return vacuous(len(seen))
     if config.rules == "paper":
-        return paper_hand_assignment(hand.gesture, [candidate.bearing_deg for candidate in seen], config)
+        limits = (config.phi_h_min_deg, config.phi_h_max_deg)
+        return paper_hand_assignment(hand.gesture, [candidate.bearing_deg for candidate in seen], limits)
     return hand_assignment(hand, seen, config)
 
 
