@@ -1,0 +1,97 @@
+"""Background subtraction that does not swallow a person who stands still (Pateraki et al. 2011, sec. 4, [2]).
+
+A running mean of the room, frozen under tracked people. A person who stands there from the first frame is part of that mean;
+such a place is marked unknown: no change there says nothing. A change of the light moves most of the picture at once: one gain per
+channel is fitted to the room first, and what the gain cannot explain is relearned quickly when it covers much of the picture.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from deixis_tracker.boxes import Box
+
+Image = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+
+UPDATE_EVERY = 3  # frames
+GRID = 8  # the gain is fitted on every 8th pixel
+UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, changed
+SHADOW_CHROMA = 0.07
+SHADOW_DARKEST = 0.35
+
+
+class Background:
+    """Mean picture of the room. Call `changed`, then `update`, once a frame."""
+
+    def __init__(self, image: Image, threshold: int) -> None:
+        """Start from the first (H, W, 3) BGR picture; `threshold` in grey levels."""
+        self._mean = image.astype(np.float32)
+        self._shown = image.copy()
+        self._threshold = threshold
+        self._frames = 0
+        self.unknown: Mask = np.zeros(image.shape[:2], np.uint8)
+        self.unstable = 0  # frames until a change of light counts as learned
+        self._expected = self._shown
+
+    def mark_unknown(self, box: Box) -> None:
+        """Say that a person covers `box` in the mean."""
+        rows, columns = box.window(*self.unknown.shape)
+        self.unknown[rows, columns] = 255
+
+    def changed(self, image: Image, frozen: Mask) -> Mask:
+        """(H, W) uint8, 255 where the picture differs from the room under today's light. `frozen`: 255 where people are."""
+        self._expected = np.asarray(cv2.LUT(self._shown, self._gain_table(image, frozen)), np.uint8)
+        difference = cv2.absdiff(image, self._expected)
+        b, g, r = cv2.split(difference)
+        largest = cv2.max(cv2.max(b, g), r)
+        return np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
+
+    def remove_shadow(self, image: Image, mask: Mask) -> Mask:
+        """`mask` without pixels that are the room, darker and of the same colour: the shadow of a person."""
+        rows, columns = np.nonzero(mask)
+        if not len(rows):
+            return mask
+        seen = np.log(image[rows, columns].astype(np.float32) + 6)
+        room = np.log(self._expected[rows, columns].astype(np.float32) + 6)
+        ratio = seen - room
+        darker = ratio.mean(axis=1)
+        same_colour = (np.abs(ratio[:, 2] - ratio[:, 1]) < SHADOW_CHROMA) & (np.abs(ratio[:, 1] - ratio[:, 0]) < SHADOW_CHROMA)
+        shadow = same_colour & (darker < 0.05) & (darker > np.log(SHADOW_DARKEST))
+        result = mask.copy()
+        result[rows[shadow], columns[shadow]] = 0
+        return result
+
+    def update(self, image: Image, changed: Mask, frozen: Mask) -> None:
+        """Learn the room where no person is: steady places quickly, changed ones slowly, all at once when the light changed."""
+        self._frames += 1
+        room = frozen == 0
+        room_size = int(np.count_nonzero(room[::4, ::4]))
+        moved = int(np.count_nonzero(changed[::4, ::4] * room[::4, ::4]))
+        if room_size and moved > UPHEAVAL * room_size:
+            self.unstable = 12
+        self.unstable = max(0, self.unstable - 1)
+        if self.unstable:
+            self._learn(image, np.asarray(room, np.uint8), 0.35)
+        elif self._frames % UPDATE_EVERY == 0:
+            self._learn(image, np.asarray(room & (changed == 0), np.uint8), 0.1)
+            self._learn(image, np.asarray(room & (changed != 0), np.uint8), 0.02)
+
+    def _learn(self, image: Image, where: Mask, rate: float) -> None:
+        cv2.accumulateWeighted(image, self._mean, rate, mask=where)
+        self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
+
+    def _gain_table(self, image: Image, frozen: Mask) -> NDArray[np.uint8]:
+        """One gain per channel, the median ratio over the room, as a table for cv2.LUT."""
+        grid = np.s_[GRID // 2 :: GRID, GRID // 2 :: GRID]
+        free = frozen[grid] == 0
+        table = np.empty((1, 256, 3), np.uint8)
+        levels = np.arange(256, dtype=np.float32)
+        for c in range(3):
+            seen, room = image[..., c][grid][free].astype(np.float32), self._shown[..., c][grid][free].astype(np.float32)
+            usable = (room > 20) & (room < 245) & (seen < 245)
+            gain = float(np.median(seen[usable] / room[usable])) if usable.sum() >= 20 else 1.0
+            table[0, :, c] = np.clip(levels * gain, 0, 255)
+        return table

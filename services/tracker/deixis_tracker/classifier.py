@@ -1,0 +1,91 @@
+"""Incremental probabilistic classifier of hand blobs (after Pateraki et al. 2011, sec. 4, [3]).
+
+Each frame adds the log likelihoods of what was measured (place relative to the face, size, foreground evidence, speed) to the
+belief over left hand, right hand and unknown. Frames in a row say nearly the same thing, so each counts only for a fraction, and
+old evidence fades. Left and right are the person's own: the left hand hangs at the image's right of the face. A hand hanging at its side says much
+about its side, a raised one little, for arms cross the body: so the label of an arm that is raised comes from where it was.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import permutations
+from typing import Literal, NamedTuple
+
+from deixis_schemas.messages import KindProbabilities
+
+HandKind = Literal["left_hand", "right_hand", "unknown"]
+KINDS: tuple[HandKind, ...] = ("left_hand", "right_hand", "unknown")
+
+HANGING_BELOW = 2.0  # face widths below the face
+RATE_PER_S = 8.0  # independent observations a second
+MEMORY = 7.0  # most log odds that are kept
+SIDE_BONUS = 1.5
+
+
+class Features(NamedTuple):
+    """What is measured of a blob in one frame; lengths in face widths, `dx` and `dy` from the face, image right and down."""
+
+    dx: float
+    dy: float
+    speed: float
+    area: float
+    evidence: float  # share of the blob that moved or changed against the background, 0 to 1
+
+
+def _normal(value: float, mean: float, sigma: float) -> float:
+    return -0.5 * ((value - mean) / sigma) ** 2 - math.log(sigma)
+
+
+def log_likelihoods(f: Features) -> dict[HandKind, float]:
+    """Log likelihood of the features for each kind, up to a common constant."""
+    mean, sigma = (1.2, 0.8) if f.dy > HANGING_BELOW else (1.3, 1.9)
+    size = math.log(max(f.area, 1e-3))
+    hand = _normal(size, math.log(0.3), 0.7) + math.log(0.25 + 0.75 * f.evidence) + math.log(0.4 + min(0.6, 0.2 * f.speed))
+    other = _normal(size, math.log(0.3), 1.5) + math.log(0.9 - 0.6 * f.evidence) + math.log(0.7 - min(0.5, 0.2 * f.speed))
+    return {
+        "left_hand": hand + _normal(f.dx, mean, sigma),
+        "right_hand": hand + _normal(f.dx, -mean, sigma),
+        "unknown": other + _normal(f.dx, 0.0, 3.0),
+    }
+
+
+class HandBelief:
+    """Belief of one track over the kinds."""
+
+    def __init__(self) -> None:
+        self._log: dict[HandKind, float] = dict.fromkeys(KINDS, 0.0)
+
+    def update(self, features: Features, dt_s: float) -> None:
+        """Add what one frame says; `dt_s` since the last."""
+        weight = min(1.0, RATE_PER_S * dt_s)
+        for kind, value in log_likelihoods(features).items():
+            self._log[kind] += weight * value
+        top = max(self._log.values())
+        self._log = {kind: max(value - top, -MEMORY) for kind, value in self._log.items()}
+
+    def favour(self, kind: HandKind) -> None:
+        """Add knowledge from outside, e.g. that the other hand was seen elsewhere at that time."""
+        self._log[kind] += SIDE_BONUS
+
+    def log(self, kind: HandKind) -> float:
+        """Log belief in a kind, up to a constant that all kinds of this track share."""
+        return self._log[kind]
+
+    def probabilities(self) -> KindProbabilities:
+        """Normalised belief."""
+        top = max(self._log.values())
+        weights = {kind: math.exp(value - top) for kind, value in self._log.items()}
+        total = sum(weights.values())
+        return KindProbabilities(**{str(kind): weight / total for kind, weight in weights.items()})
+
+
+def label(beliefs: list[HandBelief], current: list[HandKind]) -> list[HandKind]:
+    """Kinds of the tracks of one person, each hand at most once: the assignment of most belief; a change needs a margin."""
+    pool: list[HandKind] = ["left_hand", "right_hand", *(["unknown"] * len(beliefs))]
+
+    def worth(kinds: tuple[HandKind, ...]) -> float:
+        kept = sum(1.5 for new, old in zip(kinds, current, strict=True) if new == old and old != "unknown")
+        return kept + sum(belief.log(kind) for belief, kind in zip(beliefs, kinds, strict=True))
+
+    return list(max(sorted(set(permutations(pool, len(beliefs)))), key=worth))

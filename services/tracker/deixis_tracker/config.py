@@ -1,0 +1,45 @@
+"""Settings of the tracker stage: `settings.tracker` of a site file and `--set` share these names."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class TrackerConfig(BaseModel):
+    """How frames become face and hand tracks. Lengths are in face widths, as published, unless the name says otherwise."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    work_width_px: int = Field(
+        default=640,
+        ge=160,
+        le=1920,
+        description="Larger pictures are scaled down to this width for tracking; pixels published are of the frame.",
+    )
+    max_persons: int = Field(default=4, ge=1, le=16, description="Most persons tracked at a time.")
+    min_face_px: int = Field(default=22, ge=16, le=400, description="Smallest face looked for, pixels of the working picture.")
+    max_face_share: float = Field(
+        default=0.6, gt=0.05, le=1, description="Largest face looked for, share of the picture's height."
+    )
+    search_budget_mpx: float = Field(
+        default=0.075,
+        gt=0.005,
+        le=10,
+        description="Area the face detector may search per frame, megapixels over all scales; bounds the time of a frame.",
+    )
+    confirm_hits: int = Field(default=3, ge=1, le=20, description="Detections in separate frames before a face is believed.")
+    lose_face_after_s: float = Field(
+        default=2.5, gt=0, le=60, description="A face not supported by the picture for so long is dropped."
+    )
+    lose_hand_after_s: float = Field(default=0.5, gt=0, le=60, description="A hand not seen for so long is dropped.")
+    prior_skin: float = Field(default=0.2, gt=0, lt=1, description="Share of skin expected among the pixels judged.")
+    skin_high: int = Field(default=150, ge=1, le=255, description="A blob needs a pixel with this P(skin), of 255.")
+    skin_low: int = Field(default=70, ge=1, le=255, description="A blob grows over pixels with this P(skin), of 255.")
+    change_threshold: int = Field(
+        default=20, ge=2, le=200, description="Difference from the background that counts as change, grey levels."
+    )
+    min_hand_area: float = Field(default=0.05, gt=0, le=5, description="Smallest hand, face widths squared.")
+    hand_length: float = Field(
+        default=1.0, gt=0.2, le=3, description="Length of a hand, by which it is cut from a bare forearm."
+    )
+    reach: float = Field(default=5.0, gt=1, le=20, description="Farthest a hand can be from its head.")

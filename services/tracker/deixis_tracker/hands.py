@@ -1,0 +1,119 @@
+"""Cuts the hand from a blob of hand and bare forearm.
+
+With short sleeves the skin blob is the whole arm. The hand is its far end: about one face width along the blob from the tip, where the
+tip is the point farthest along the blob (geodesically, for elbows are bent) from where the arm comes from, the shoulder.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.uint8]
+
+CELLS_PER_WIDTH = 12  # resolution of the geodesic distances
+NEAR_SHOULDER = 1.2  # face widths: a blob that starts so near the shoulder starts with the upper arm
+SQUARE, CROSS = np.ones((3, 3), np.uint8), np.asarray(cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)), np.uint8)
+
+
+class Hand(NamedTuple):
+    """A hand in a window whose corner is at (x0, y0): its mask (0 or 1), area, centroid and tip in pixels of the picture."""
+
+    mask: Mask
+    x0: int
+    y0: int
+    area: int
+    centroid: tuple[float, float]
+    tip: tuple[float, float]
+    arm_length_px: float
+
+
+def geodesic(mask: Mask, seed: tuple[int, int]) -> NDArray[np.float32]:
+    """Distance in pixels inside the mask from the `seed` (x, y) to each pixel of the mask; -1 where it does not lead."""
+    distance = np.full(mask.shape, -1, np.float32)
+    reached = np.zeros_like(mask)
+    reached[seed[1], seed[0]] = 1
+    distance[seed[1], seed[0]] = 0
+    for step in range(1, mask.size):
+        grown = cv2.dilate(reached, SQUARE if step % 2 else CROSS) & mask  # alternating: an octagon, nearly a circle
+        fresh = grown > reached
+        if not fresh.any():
+            break
+        distance[fresh] = step
+        reached = grown
+    return distance
+
+
+def cut_hand(
+    mask: Mask,
+    x0: int,
+    y0: int,
+    shoulder: tuple[float, float],
+    face_width_px: float,
+    length: float,
+    expected: tuple[float, float] | None,
+) -> Hand:
+    """The hand at the far end of a blob.
+
+    `mask` (0 or 1) is a window at (x0, y0) that holds one blob; `shoulder` is where the arm starts, `length` that of a hand in face
+    widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm held up in
+    front of the shoulder has its hand at the near end.
+    """
+    factor = min(1.0, CELLS_PER_WIDTH / face_width_px)
+    small = mask if factor == 1 else _shrink(mask, factor)
+    offset = np.array([x0, y0], float)
+    near = _closest(small, (np.array(shoulder) - offset) * factor)
+    from_shoulder = geodesic(small, near)
+    far = _farthest(from_shoulder)
+    tip, whole = far, float(from_shoulder.max())
+    if expected is not None and whole > 1.2 * length * face_width_px * factor:
+        target = (np.array(expected) - offset) * factor
+        half = 0.5 * length * face_width_px * factor
+        ends = [_toward(np.array(far), np.array(near), half), _toward(np.array(near), np.array(far), half)]
+        away = [float(np.hypot(*(end - target))) for end in ends]
+        from_body = float(np.hypot(*(np.array(near) / factor + offset - shoulder))) / face_width_px
+        if from_body > NEAR_SHOULDER and away[1] < 0.5 * away[0] and away[1] < half:
+            tip = near
+    distance = geodesic(small, tip)
+    keep = np.asarray((distance >= 0) & (distance <= length * face_width_px * factor), np.uint8)
+    if factor != 1:
+        keep = np.asarray(cv2.resize(keep, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
+    hand = mask & keep
+    moments = cv2.moments(hand, binaryImage=True)
+    area = max(1.0, moments["m00"])
+    centroid = (x0 + moments["m10"] / area, y0 + moments["m01"] / area)
+    return Hand(hand, x0, y0, int(area), centroid, (x0 + tip[0] / factor, y0 + tip[1] / factor), whole / factor)
+
+
+def outline(hand: Hand) -> NDArray[np.int32]:
+    """Outer contour (N, 2) x, y of the largest part, every border pixel, in pixels of the picture."""
+    contours, _ = cv2.findContours(hand.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(hand.x0, hand.y0))
+    if not contours:
+        return np.empty((0, 2), np.int32)
+    return np.asarray(max(contours, key=cv2.contourArea), np.int32).reshape(-1, 2)
+
+
+def _shrink(mask: Mask, factor: float) -> Mask:
+    size = (max(1, round(mask.shape[1] * factor)), max(1, round(mask.shape[0] * factor)))
+    covered = cv2.resize(mask * np.uint8(255), size, interpolation=cv2.INTER_AREA)
+    small = np.asarray(covered > 60, np.uint8)
+    return small if small.any() else np.asarray(covered >= covered.max(), np.uint8)
+
+
+def _closest(mask: Mask, point: NDArray[np.float64]) -> tuple[int, int]:
+    rows, columns = np.nonzero(mask)
+    k = int(np.argmin((columns - point[0]) ** 2 + (rows - point[1]) ** 2))
+    return int(columns[k]), int(rows[k])
+
+
+def _farthest(distance: NDArray[np.float32]) -> tuple[int, int]:
+    row, column = np.unravel_index(int(np.argmax(distance)), distance.shape)
+    return int(column), int(row)
+
+
+def _toward(start: NDArray[np.int64], end: NDArray[np.int64], length: float) -> NDArray[np.float64]:
+    gap = max(1e-6, float(np.hypot(*(end - start))))
+    return np.asarray(start + (end - start) * min(1.0, length / gap), np.float64)

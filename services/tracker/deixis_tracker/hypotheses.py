@@ -1,0 +1,46 @@
+"""Propagated pixel hypotheses (Pateraki et al. 2011, sec. 4, [1]).
+
+Pixels of a track's last blob, moved by its Kalman state and spread by its uncertainty, are hypotheses of where its pixels are now.
+Their density says how much an observed skin pixel belongs to that track, also where two objects have grown into one blob.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float32]
+Density = NDArray[np.float32]
+
+CELL = 4  # pixels per cell of a density
+MOST_HYPOTHESES = 256
+
+
+def sample_pixels(mask: NDArray[np.uint8], x0: int, y0: int) -> Points:
+    """At most MOST_HYPOTHESES pixels (N, 2) x, y of a mask window whose corner is at (x0, y0), evenly taken."""
+    rows, columns = np.nonzero(mask)
+    step = max(1, len(rows) // MOST_HYPOTHESES)
+    return np.stack([columns[::step] + x0, rows[::step] + y0], axis=1).astype(np.float32)
+
+
+def propagate(pixels: Points, dx: float, dy: float, sigma_px: float, height: int, width: int) -> Density:
+    """Density of `pixels` moved by (dx, dy) and spread by `sigma_px`, per cell of CELL x CELL pixels; sums to 1 inside the picture."""
+    cells = ((pixels + (dx, dy)) / CELL).astype(np.int64)
+    rows, columns = height // CELL + 1, width // CELL + 1
+    inside = (cells[:, 0] >= 0) & (cells[:, 0] < columns) & (cells[:, 1] >= 0) & (cells[:, 1] < rows)
+    flat = cells[inside, 1] * columns + cells[inside, 0]
+    density = np.bincount(flat, minlength=rows * columns).reshape(rows, columns).astype(np.float32) / max(1, len(pixels))
+    sigma = min(max(0.7, sigma_px / CELL), 20.0)
+    return np.asarray(cv2.GaussianBlur(density, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32)
+
+
+def support(density: Density, mask: NDArray[np.uint8], x0: int, y0: int) -> float:
+    """Share of a track's hypotheses that fall on the observed pixels `mask` (a window with its corner at (x0, y0)), 0 to 1."""
+    return float(min(1.0, at_pixels(density, mask, x0, y0).sum() / CELL**2))
+
+
+def at_pixels(density: Density, mask: NDArray[np.uint8], x0: int, y0: int) -> Density:
+    """Density at each pixel of the mask that is set, in row order."""
+    rows, columns = np.nonzero(mask)
+    return density[(rows + y0) // CELL, (columns + x0) // CELL]

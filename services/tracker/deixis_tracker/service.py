@@ -1,0 +1,37 @@
+"""Shell of the tracker stage: frames in, tracks out."""
+
+from __future__ import annotations
+
+import cv2
+from deixis_runtime.images import ImageError, decode_image
+from deixis_runtime.stage import Node, run_stage
+from deixis_schemas import topics
+from deixis_schemas.messages import Tracks
+
+from deixis_tracker.config import TrackerConfig
+from deixis_tracker.tracker import Tracker
+
+
+def serve(node: Node, config: TrackerConfig) -> None:
+    """Run the stage until shutdown."""
+    cv2.setNumThreads(1)  # threads of OpenCV cost the other stages more than they gain here
+    frames = node.subscribe(topics.FRAME)
+    out = node.publish(topics.TRACKS)
+    tracker = Tracker(config)
+    while node.wait():
+        frame = frames.take()
+        if frame is None:
+            continue
+        with node.step():
+            try:
+                tracks = tracker.update(decode_image(frame), frame.stamp_ns)
+            except (ImageError, ValueError) as error:
+                node.count("frames_refused")
+                node.warn("frame", f"frame {frame.seq} refused: {error}")
+                tracks = []  # fusion still waits for an answer to this frame
+            out.put(Tracks.derive(frame, node.producer, width=frame.width, height=frame.height, tracks=tracks))
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Console script `deixis-tracker`."""
+    return run_stage("tracker", TrackerConfig, serve, argv)

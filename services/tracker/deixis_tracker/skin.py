@@ -1,0 +1,153 @@
+"""Bayesian skin colour: P(skin | colour), adapted to the person and the room (Pateraki et al. 2011, sec. 4, [2]).
+
+Colours are judged in a space of log ratios, log(R/G) and log(G/B), which a change of brightness leaves alone, with the log of
+the brightness as a weak third axis. The densities of skin and of everything else are mixtures of Gaussians (`skin_prior.py`); the
+skin of a detected face and the colours of the room are mixed in. The posterior lives in a table of 32 x 32 x 32 colours, so a
+frame costs one look-up per pixel.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from deixis_tracker.colour_table import look_up
+from deixis_tracker.skin_prior import OTHER, SKIN, Gaussian
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+
+BINS = 32
+OFFSET = 6.0  # keeps the ratios of dark pixels, which are mostly noise, near 1
+# Spread that is always granted to a person's skin: hands are lit otherwise than the face, and palms are paler.
+SPREAD_FLOOR = np.diag([0.075**2, 0.075**2, 0.55**2])
+PERSON_SHARE = 0.75
+ROOM_SHARE = 0.6
+
+
+def chroma_features(bgr: Array) -> Array:
+    """(N, 3) colours -> (N, 3): log(R/G), log(G/B), log brightness."""
+    b, g, r = (bgr.T + OFFSET)[:3]
+    return np.stack([np.log(r / g), np.log(g / b), np.log((r + g + b) / 3)], axis=1)
+
+
+def gaussian_densities(x: Array, mean: Array, covariance: Array) -> Array:
+    """Densities of a Gaussian at (N, D) points."""
+    offset = x - mean
+    inverse = np.linalg.inv(covariance)
+    distance = np.einsum("ni,ij,nj->n", offset, inverse, offset)
+    norm = np.sqrt((2 * np.pi) ** x.shape[1] * np.linalg.det(covariance))
+    return np.asarray(np.exp(-0.5 * distance) / norm, np.float64)
+
+
+def _mixture(x: Array, parts: tuple[Gaussian, ...]) -> Array:
+    total = np.zeros(len(x))
+    for part in parts:
+        total += part.weight * gaussian_densities(x, np.array(part.mean), np.array(part.covariance))
+    return total
+
+
+def _table_colours() -> Array:
+    centres = np.arange(BINS) * (256 / BINS) + 128 / BINS
+    b, g, r = np.meshgrid(centres, centres, centres, indexing="ij")
+    return np.stack([b.ravel(), g.ravel(), r.ravel()], axis=1)
+
+
+class SkinModel:
+    """P(skin | colour) as a table. `adapt_person` and `adapt_room` change it; `probability` applies it."""
+
+    def __init__(self, prior_skin: float) -> None:
+        """`prior_skin`: share of skin among the pixels looked at, 0 to 1 (exclusive)."""
+        self._prior = prior_skin
+        self._features = chroma_features(_table_colours())
+        self._skin_prior = _mixture(self._features, SKIN)
+        self._other_prior = _mixture(self._features, OTHER)
+        self._volume = self._cell_volume()
+        self._person: dict[int, tuple[Array, Array]] = {}
+        self._person_density: dict[int, Array] = {}
+        self._room: Array | None = None
+        self._table = self._posterior()
+
+    def probability(self, image: Image) -> Image:
+        """P(skin) of each pixel of an (H, W, 3) BGR image as (H, W) uint8, 255 = certain."""
+        return look_up(self._table, image)
+
+    def adapt_person(self, person_id: int, pixels: NDArray[np.uint8], rate: float) -> None:
+        """Move the skin colour of one person toward (N, 3) BGR pixels of the face, by `rate` (0 to 1)."""
+        if len(pixels) < 30:
+            return
+        x = chroma_features(pixels.astype(float))
+        # The face box also holds brows, beard and shadow: keep what lies near the median.
+        centre = np.median(x, axis=0)
+        near = np.all(np.abs(x - centre) < np.array([0.25, 0.25, 0.9]), axis=1)
+        if near.sum() < 20:
+            return
+        mean, covariance = x[near].mean(axis=0), np.cov(x[near].T)
+        if person_id in self._person:
+            old_mean, old_covariance = self._person[person_id]
+            mean = old_mean + rate * (mean - old_mean)
+            covariance = old_covariance + rate * (covariance - old_covariance)
+        self._person[person_id] = mean, covariance
+        self._person_density[person_id] = gaussian_densities(self._features, mean, covariance + SPREAD_FLOOR)
+        self._table = self._posterior()
+
+    def adapt_room(self, image: Image, room: Mask) -> None:
+        """Learn the colours of the room, where `room` (H, W) is not 0: what is no skin here."""
+        counts = cv2.calcHist([image], [0, 1, 2], room, [BINS] * 3, [0, 256] * 3).astype(np.float64)
+        if counts.sum() < 100:
+            return
+        counts = _smooth(counts) / counts.sum()
+        density = counts.ravel() / self._volume
+        self._room = density if self._room is None else 0.7 * self._room + 0.3 * density
+        self._table = self._posterior()
+
+    def forget_person(self, person_id: int) -> None:
+        """Drop the colour of a person who left."""
+        self._person.pop(person_id, None)
+        if self._person_density.pop(person_id, None) is not None:
+            self._table = self._posterior()
+
+    def _posterior(self) -> Image:
+        skin, other = self._skin_prior, self._other_prior
+        if self._person_density:
+            person = np.max(list(self._person_density.values()), axis=0)
+            skin = (1 - PERSON_SHARE) * skin + PERSON_SHARE * person
+        if self._room is not None:
+            other = (1 - ROOM_SHARE) * other + ROOM_SHARE * self._room
+        joint = self._prior * skin
+        posterior = joint / np.maximum(joint + (1 - self._prior) * other, 1e-12)
+        return (255 * posterior).reshape(BINS, BINS, BINS).astype(np.uint8)
+
+    def _cell_volume(self) -> Array:
+        """Volume of each table cell in feature space; the Jacobian of the three logs is 1 / (R G B)."""
+        b, g, r = (_table_colours().T + OFFSET)[:3]
+        return np.asarray((256 / BINS) ** 3 / (r * g * b), np.float64)
+
+
+def _smooth(counts: Array) -> Array:
+    for axis in range(3):
+        moved = np.moveaxis(counts, axis, 0)
+        padded = np.concatenate([moved[:1], moved, moved[-1:]])
+        counts = np.moveaxis(0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:], 0, axis)
+    return counts
+
+
+def hysteresis(
+    probability: Image, low: int, high: int, min_area: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32], list[int]]:
+    """Connected components of probability >= `low` that hold a pixel >= `high` and at least `min_area` pixels.
+
+    Returns (labels, stats, kept): labels (H, W), stats as of cv2.connectedComponentsWithStats, and the labels kept.
+    """
+    weak = np.asarray(probability >= low, np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(weak, connectivity=8)
+    large = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] >= min_area]
+    kept = []
+    for k in large:
+        x, y, w, h = stats[k, :4]
+        window = np.s_[y : y + h, x : x + w]
+        if np.any((labels[window] == k) & (probability[window] >= high)):
+            kept.append(k)
+    return np.asarray(labels, np.int32), np.asarray(stats, np.int32), kept
