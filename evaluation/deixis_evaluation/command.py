@@ -84,7 +84,7 @@ def _tell(given: argparse.Namespace, scores: Sequence[ClipScore]) -> int:
     if not console.is_terminal:
         console.width = TABLE_WIDTH
     print_scores(console, scores, summary)
-    console.print(say_machine(machine), style="dim", markup=False, highlight=False)
+    console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     if given.json is not None:
         content = report(given.folder, scores, summary, machine, lockstep=given.lockstep)
         given.json.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
