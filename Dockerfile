@@ -3,11 +3,12 @@
 #   docker build --build-arg STAGE=tracker --tag deixis-tracker .
 
 FROM python:3.11-slim-bookworm AS wheels
+RUN pip install --quiet --no-cache-dir --root-user-action ignore hatchling
 COPY schemas /source/schemas
 COPY runtime /source/runtime
 COPY cli /source/cli
 COPY services /source/services
-RUN pip wheel --quiet --no-cache-dir --no-deps --wheel-dir /wheels \
+RUN pip wheel --quiet --no-cache-dir --no-build-isolation --no-deps --wheel-dir /wheels \
     /source/schemas /source/runtime /source/cli /source/services/*
 
 FROM python:3.11-slim-bookworm

@@ -1,0 +1,95 @@
+"""A head pose stage of one's own in the place of deixis-headpose: what a stage has to do, in plain Python.
+
+It estimates coarsely: hair is darker than skin, and shows on the side of the face box that the face has turned from. How far
+the dark moves from where it was in a person's first frames gives the yaw; people are taken to begin facing the camera.
+"""
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections import defaultdict
+
+import numpy as np
+import zenoh
+from deixis_schemas import Producer, codec, topics
+from deixis_schemas.messages import HeadPoses
+
+FRAMES_TO_START = 10
+SINE_PER_OFFSET = -2.1  # fitted on labelled head turns: offset in half box widths to the sine of the yaw
+MAX_SINE, SIGMA_DEG = 0.97, 15.0
+
+
+def dark_offset(picture, box):
+    """Where the dark lies in a face box, -1 its left edge to 1 its right; None where there is nothing to see."""
+    x, y, w, h = (max(0, round(v)) for v in box)
+    grey = picture[y : y + h, x : x + w].mean(axis=2)
+    if min(grey.shape) < 8:
+        return None
+    dark = np.clip(np.median(grey) - grey, 0, None).sum(axis=0)
+    return float(dark @ np.linspace(-1, 1, dark.size) / max(dark.sum(), 1e-9))
+
+
+def head_pose(person_id, offset, first):
+    """The HeadPose of one person; `first` collects the offsets of the first frames."""
+    if offset is None:
+        return {"person_id": person_id, "status": "lost"}
+    if len(first) < FRAMES_TO_START:
+        first.append(offset)
+        return {"person_id": person_id, "status": "initialising"}
+    sine = SINE_PER_OFFSET * (offset - np.median(first))
+    if abs(sine) > MAX_SINE:
+        return {"person_id": person_id, "status": "out_of_range", "side": "left" if sine > 0 else "right"}
+    yaw_deg = math.degrees(math.asin(sine))
+    return {"person_id": person_id, "status": "tracking", "yaw_deg": yaw_deg, "yaw_sigma_deg": SIGMA_DEG}
+
+
+def read(topic, sample):
+    """The message in a sample; None, and a word about it, where it breaks the contract."""
+    try:
+        return codec.decode(topic.type, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topic.max_bytes)
+    except codec.CodecError as error:
+        print(f"{sample.key_expr}: {error}", file=sys.stderr)
+        return None
+
+
+def main():
+    """Publish head poses until told to stop."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robot", required=True)
+    parser.add_argument("--connect", default="tcp/127.0.0.1:7447", metavar="ENDPOINT", help="default: %(default)s")
+    given = parser.parse_args()
+    producer = Producer("headpose", f"swap-{os.getpid()}")
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([given.connect]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config) as session:
+        # Rings keep the newest: whoever is slow works on what is new and never on a backlog.
+        frames = session.declare_subscriber(topics.FRAME.key(given.robot), zenoh.handlers.RingChannel(8))
+        tracks = session.declare_subscriber(topics.TRACKS.key(given.robot), zenoh.handlers.RingChannel(1))
+        poses = session.declare_publisher(topics.HEAD_POSES.key(given.robot), encoding=codec.encoding_of(HeadPoses))
+        alive = session.liveliness().declare_token(topics.alive_key(given.robot, *producer))
+        print(f"swap_headpose: alive as {producer.instance}", flush=True)
+        held, first = {}, defaultdict(list)
+        while alive:
+            seen = read(topics.TRACKS, tracks.recv())
+            while (sample := frames.try_recv()) is not None:
+                frame = read(topics.FRAME, sample)
+                if frame is not None and frame.encoding != "bgr8":
+                    sys.exit(f"swap_headpose: frames are {frame.encoding}; start the camera with --set camera.encoding=bgr8")
+                if frame is not None:
+                    held[frame.frame_id] = frame
+            held = dict(list(held.items())[-8:])
+            if seen is None or seen.frame_id not in held:
+                continue
+            frame = held[seen.frame_id]
+            picture = np.frombuffer(frame.data, np.uint8).reshape(frame.height, frame.width, 3)
+            faces = {track.person_id: track for track in seen.tracks if track.kind == "face" and track.person_id is not None}
+            found = [head_pose(who, dark_offset(picture, face.bbox_px), first[who]) for who, face in faces.items()]
+            poses.put(codec.encode(HeadPoses.derive(seen, producer, poses=found)))
+
+
+if __name__ == "__main__":
+    main()
