@@ -15,7 +15,8 @@ from .delivery import PROFILES
 class Publisher:
     """Publishes messages of one topic on one key."""
 
-    def __init__(self, session: zenoh.Session, topic: Topic, key: str) -> None:
+    def __init__(self, session: zenoh.Session, topic: Topic, key: str, *, lossless: bool = False) -> None:
+        """`lossless` waits where a link is full instead of dropping: for lockstep, where a lost frame makes runs differ."""
         profile = PROFILES[topic.delivery]
         self.key = key
         self.published = 0
@@ -25,7 +26,7 @@ class Publisher:
         self._publisher = session.declare_publisher(
             key,
             encoding=codec.encoding_of(topic.type),
-            congestion_control=zenoh.CongestionControl.DROP,
+            congestion_control=zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP,
             priority=profile.priority,
             express=profile.express,
         )

@@ -81,7 +81,8 @@ class Node:
 
     def publish(self, topic: Topic) -> Publisher:
         """A publisher of a topic of this stage."""
-        publisher = Publisher(self._session, topic, topic.key(self.robot, stage=self.producer.stage))
+        key = topic.key(self.robot, stage=self.producer.stage)
+        publisher = Publisher(self._session, topic, key, lossless=self.lockstep)
         self._outputs.append(publisher)
         return publisher
 

@@ -1,0 +1,110 @@
+"""What doctor finds wrong, and with which advice."""
+
+import pytest
+from deixis_cli.checks import Listening, findings
+from deixis_cli.system import StageProcess, System
+from deixis_schemas import topics
+from deixis_schemas.messages import CameraInfo, Health, InputHealth, OutputHealth, Poi, State
+
+CLEAN = Listening(frozenset(topics.STAGES), edits_reach_fusion=True)
+POI = Poi(poi_id="door", position_m=(1, 2, 0))
+
+
+def health(stage, **changes):
+    outputs = [
+        OutputHealth(key=f"deixis/r1/{topic.path}", published=300, rate_hz=30)
+        for topic in topics.TOPICS
+        if topic.path.split("/")[0] == stage
+    ]
+    content = {"stamp_ns": 1, "stage": stage, "instance": "a", "count": 9, "state": "ok", "pid": 1, "host": "edge"}
+    return Health(**{**content, "uptime_s": 60, "cpu_s": 6, "rss_mb": 50, "outputs": outputs, **changes})
+
+
+def process(stage, instance="a", alive=True, clock_ahead_s=0.0, **changes):
+    return StageProcess(stage, instance, alive, health(stage, **changes), 10.0, clock_ahead_s)
+
+
+def camera(**changes):
+    return CameraInfo(
+        **{"stamp_ns": 1, "stage": "camera", "instance": "a", "state": "streaming", "source": "0", "rate_hz": 30} | changes
+    )
+
+
+def state(pois=(POI,), **changes):
+    return State(stamp_ns=1, stage="fusion", instance="a", robot="r1", sources=[], pois=list(pois), persons=[], **changes)
+
+
+def system(**changes):
+    processes = {stage: [process(stage)] for stage in topics.STAGES} | changes.pop("processes", {})
+    flat = [item for stage in processes.values() for item in stage]
+    return System("r1", flat, **({"camera": camera(), "state": state()} | changes))
+
+
+def wrong(system, listening=CLEAN):
+    return [finding.what for finding in findings(system, listening) if finding.level == "wrong"]
+
+
+def test_a_healthy_system_has_nothing_wrong():
+    assert wrong(system()) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"processes": {"headpose": []}}, "headpose: no process of it is alive"),
+        ({"processes": {"gesture": [StageProcess("gesture", "a", True, None)]}}, "gesture/a: alive but gives no answer"),
+        ({"processes": {"fusion": [process("fusion", state="degraded", reason="late")]}}, "fusion: degraded: late"),
+        ({"processes": {"tracker": [process("tracker", who) for who in "ab"]}}, "stage tracker has 2 producers"),
+        ({"processes": {"camera": [process("camera", clock_ahead_s=-7.0)]}}, "the clock of host edge is 7.0 s behind ours"),
+        ({"camera": camera(state="retrying", reason="it is not there")}, "camera: retrying: it is not there"),
+        ({"camera": camera(rate_hz=60)}, "tracker/tracks: 30.0/s, expected 60/s"),
+        ({"state": state(pois=())}, "there are no points of interest"),
+        ({"state": None}, "fusion/state: a get is not answered"),
+    ],
+)  # fmt: skip
+def test_each_fault_is_named(changed, said):
+    assert any(what.startswith(said) for what in wrong(system(**changed)))
+
+
+def test_inputs_that_are_silent_or_refused_are_named():
+    inputs = [
+        InputHealth(key="deixis/r1/camera/frame", received=5, age_s=9.0),
+        InputHealth(key="deixis/r1/tracker/tracks", rejected=3, last_error="Tracks version '2'", age_s=0.1),
+    ]
+    said = wrong(system(processes={"headpose": [process("headpose", inputs=inputs)]}))
+    assert said == [
+        "headpose has heard no camera/frame for 9 s",
+        "headpose refused 3 of tracker/tracks: Tracks version '2'",
+    ]
+
+
+def test_two_producers_of_a_key_are_noticed_by_those_who_hear_them():
+    heard = [InputHealth(key="deixis/r1/headpose/poses", producers=["headpose/a", "mediapipe/z"], age_s=0.1)]
+    said = wrong(system(processes={"fusion": [process("fusion", inputs=heard)]}))
+    assert said == ["key deixis/r1/headpose/poses has 2 producers: headpose/a, mediapipe/z"]
+
+
+def test_a_stand_in_that_is_heard_takes_the_place_of_a_missing_stage():
+    heard = [InputHealth(key="deixis/r1/headpose/poses", producers=["headpose/mine"], age_s=0.1)]
+    assert wrong(system(processes={"headpose": [], "fusion": [process("fusion", inputs=heard)]})) == []
+
+
+def test_denied_subscriptions_and_denied_edits_are_told_from_silence():
+    said = wrong(system(), Listening(frozenset(topics.STAGES) - {"camera"}, edits_reach_fusion=False))
+    assert said == [
+        "camera: health is answered to a get but not heard by listening",
+        "fusion/poi: an edit by get does not reach fusion",
+    ]
+
+
+def test_a_stage_that_has_just_started_is_not_blamed_for_its_rate():
+    silent = [InputHealth(key="deixis/r1/camera/frame")]
+    young = process("tracker", uptime_s=1.0, outputs=[], inputs=silent)
+    assert wrong(system(processes={"tracker": [young]})) == []
+
+
+def test_rates_are_not_judged_in_lockstep_or_when_the_camera_has_ended():
+    slow = {"tracker": [process("tracker", outputs=[])]}
+    assert wrong(system(processes=slow, camera=camera(lockstep=True))) == []
+    assert wrong(system(processes=slow, camera=camera(state="ended", reason="played to its end"))) == []
+    assert wrong(system(processes=slow)) == ["tracker/tracks: 0.0/s, expected 30/s"]
