@@ -32,6 +32,9 @@ class HeadposeConfig(BaseModel):
     keyframe_spacing_deg: float = Field(default=14.0, gt=1, le=45, description="A new keyframe where none is this near.")
     keyframe_limit: int = Field(default=60, ge=1, le=500, description="Keyframes of one head at most.")
     gate: float = Field(default=0.75, gt=0, lt=1, description="Unweighted correlation below which a match is not believed.")
+    search_gate: float = Field(
+        default=0.90, gt=0, lt=1, description="Correlation below which other starts are tried as well."
+    )
     keyframe_gate: float = Field(default=0.82, gt=0, lt=1, description="Correlation needed to take a keyframe.")
 
     range_deg: float = Field(default=100.0, gt=30, le=150, description="Yaw beyond which the head is out of range, degrees.")
@@ -40,5 +43,5 @@ class HeadposeConfig(BaseModel):
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 
     initial_views: int = Field(default=3, ge=1, le=30, description="Frontal detections that must agree to start a head.")
-    haar_width_m: float = Field(default=0.180, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
+    haar_width_m: float = Field(default=0.177, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
     haar_drop_m: float = Field(default=0.006, ge=-0.1, le=0.1, description="How far that box's centre lies below the head's.")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from .head import Array, Camera, Pose, facing_camera
 
-SEARCH_WIDTH_PX = 180
-"""Side of the scaled search window: the face in it is about 70 px wide, so that every size costs the same."""
+SEARCH_WIDTH_PX = 130
+"""Side of the scaled search window: the face in it is about 50 px wide, where the detector's width scattered least (6 %)."""
 AGREE = 0.12
 """Detections agree when their centre and width differ by less than this share of the width."""
 
@@ -42,7 +42,7 @@ def _frontal_detector() -> cv2.CascadeClassifier:
 def find_frontal_face(grey: NDArray[np.uint8], centre_px: tuple[float, float], width_px: float) -> FrontalFace | None:
     """The frontal face nearest to where a track says one is (centre, face width); none where there is none.
 
-    Faces between 0.6 and 1.8 of the said width are looked for, in a square of 2.6 of it.
+    Faces between 0.6 and 2.2 of the said width are looked for, in a square of 2.6 of it.
     """
     side = round(2.6 * width_px)
     left, top = max(0, round(centre_px[0] - side / 2)), max(0, round(centre_px[1] - side / 2))
@@ -53,8 +53,8 @@ def find_frontal_face(grey: NDArray[np.uint8], centre_px: tuple[float, float], w
     method = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     window = cv2.resize(cut, None, fx=scale, fy=scale, interpolation=method)
     face = SEARCH_WIDTH_PX / 2.6
-    limits = (round(0.6 * face),) * 2, (round(1.8 * face),) * 2
-    boxes = _frontal_detector().detectMultiScale(window, 1.08, 3, minSize=limits[0], maxSize=limits[1])
+    limits = (round(0.6 * face),) * 2, (round(2.2 * face),) * 2
+    boxes = _frontal_detector().detectMultiScale(window, 1.05, 3, minSize=limits[0], maxSize=limits[1])
     found = [FrontalFace(left + (x + w / 2) / scale - 0.5, top + (y + h / 2) / scale - 0.5, w / scale) for x, y, w, h in boxes]
     return min(found, key=lambda f: np.hypot(f.x - centre_px[0], f.y - centre_px[1]), default=None)
 

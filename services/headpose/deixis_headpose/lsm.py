@@ -17,6 +17,8 @@ from .patch import Level
 
 HUBER = 1.345
 MIN_POINTS = 40
+INDEPENDENT = 0.005
+"""Share of the residuals that counts as independent: neighbouring ones are model error and move together."""
 MIN_NOISE = 1.5
 """Grey levels: below it a residual is quantisation."""
 
@@ -37,6 +39,15 @@ class Observation(NamedTuple):
     values: Array
     gradients: Array
     weights: Array
+
+
+class Prior(NamedTuple):
+    """What is expected of the pose before the picture is seen, as normal equations of the step from the start."""
+
+    information: Array
+    """(6, 6): rotation vector (rad), shift (m)."""
+    right: Array
+    """(6,): information times the expected step."""
 
 
 class Match(NamedTuple):
@@ -74,18 +85,18 @@ def match(
     templates: Sequence[Template],
     start: Pose,
     camera: Camera,
-    prior_sigma: Array,
+    prior: Prior,
     iterations: int,
 ) -> Match:
     """Find the pose at which the templates fit the picture, from `start`.
 
-    prior_sigma (6,): standard deviations of the pose about `start` (rad, metres); they keep badly seen parameters calm.
+    prior: where the pose is expected, as a step from `start`; it keeps badly seen parameters calm.
     """
     pose, travelled = start, np.zeros(6)
-    covariance = np.diag(prior_sigma**2)
+    covariance = np.asarray(np.linalg.inv(prior.information), np.float64)
     observation = observe(level, surface, pose, camera)
     for _ in range(iterations):
-        solved = _solve(observation, templates, travelled, prior_sigma)
+        solved = _solve(observation, templates, prior, travelled)
         if solved is None:
             break
         step, covariance = solved
@@ -98,7 +109,7 @@ def match(
 
 
 def _solve(
-    observation: Observation, templates: Sequence[Template], travelled: Array, prior_sigma: Array
+    observation: Observation, templates: Sequence[Template], prior: Prior, travelled: Array
 ) -> tuple[Array, Array] | None:
     """One linearised solution: pose step (6,) and its covariance (6, 6); none where too few points are seen."""
     by_pose = np.einsum("ni,nij->nj", observation.gradients, observation.projection.jacobian)
@@ -122,10 +133,9 @@ def _solve(
         right[rows] += weighted.T @ residual
     if not np.any(normal[:6, :6]):
         return None
-    # Neighbouring residuals are model error and move together: ten of them are worth about one independent observation.
-    normal, right = 0.1 * normal, 0.1 * right
-    normal[range(6), range(6)] += prior_sigma**-2
-    right[:6] -= travelled / prior_sigma**2
+    normal, right = INDEPENDENT * normal, INDEPENDENT * right
+    normal[:6, :6] += prior.information
+    right[:6] += prior.right - prior.information @ travelled
     normal[range(6, count), range(6, count)] += 1e-6
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     return (inverse @ right)[:6], inverse[:6, :6]

@@ -15,11 +15,10 @@ from .head import Array, Camera, Pose, Surface, facing_camera, rotation_of
 from .initialise import Initialiser, find_frontal_face, frontal_pose
 from .keyframes import Keyframes, take_keyframe
 from .lsm import Match, correlation, match, observe
+from .neck import Neck
 from .patch import Level, pyramid
 from .uncertainty import yaw_sigma_deg
 
-PRIOR_SIGMA = np.array([*np.radians([10.0, 12.0, 10.0]), 0.06, 0.06, 0.03])
-"""Pose step from one frame to the next: turn about x, y, z (rad), shift (m)."""
 SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 """Turns tried about the vertical where the predicted pose does not match."""
 
@@ -63,15 +62,16 @@ class TrackedHead:
         self._keyframes = Keyframes(config.keyframe_spacing_deg, config.keyframe_limit)
         self._pose: Pose | None = None
         self._correlation = 0.0
+        self._neck: Neck | None = None
         self._velocity: Array = np.zeros(6)
         self._matched_ns = 0
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
-        if self._pose is None:
+        if self._pose is None or self._neck is None:
             return self._initialise(sight)
         dt = (sight.stamp_ns - self._matched_ns) * 1e-9
-        found = self._match(sight, self._pose, dt)
+        found = self._match(sight, self._pose, self._neck, dt)
         if found is None:
             return self._hold(dt)
         self._accept(sight, found, self._pose, dt)
@@ -90,20 +90,21 @@ class TrackedHead:
         levels = self._levels(sight, pose)
         self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera, 1.5))
         self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.stamp_ns
+        self._neck = Neck(pose)
         return self._state(held_s=0.0)
 
     # --- matching --------------------------------------------------------------------------------------------------
 
-    def _match(self, sight: Sight, last: Pose, dt: float) -> Match | None:
+    def _match(self, sight: Sight, last: Pose, neck: Neck, dt: float) -> Match | None:
         """Match the keyframes to the frame, from the predicted pose, else by a search; none where the gate stays shut."""
         levels = self._levels(sight, last)
         step = self._velocity * dt
         starts = [last, last.moved(step), last.moved(1.6 * step)]
-        found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera)
-        if found.correlation >= self._config.gate:
+        found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
+        if found.correlation >= self._config.search_gate:
             return found
         starts = [turned(pose, turn) for pose in starts[:2] for turn in SEARCH_TURNS_DEG]
-        other = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera)
+        other = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
         best = max(found, other, key=lambda m: m.correlation)
         return best if best.correlation >= self._config.gate else None
 
@@ -115,13 +116,13 @@ class TrackedHead:
             scores.append(correlation(observe(levels[-1], self._surface, start, camera), templates))
         return starts[int(np.argmax(scores))]
 
-    def _refine(self, levels: Sequence[Level], start: Pose, camera: Camera) -> Match:
+    def _refine(self, levels: Sequence[Level], start: Pose, camera: Camera, neck: Neck, dt: float) -> Match:
         """Match from the coarsest level to the finest, each with the keyframes nearest to the pose so far."""
-        found = Match(start, -1.0, np.diag(PRIOR_SIGMA**2))
+        found = Match(start, -1.0, np.zeros((6, 6)))
         for k in reversed(range(len(levels))):
             views = self._keyframes.nearest(found.pose, self._config.templates)
             templates = [view.templates[k] for view in views]
-            found = match(levels[k], self._surface, templates, found.pose, camera, PRIOR_SIGMA, self._config.iterations)
+            found = match(levels[k], self._surface, templates, found.pose, camera, neck.prior(found.pose, dt), self._config.iterations)
         return found
 
     def _levels(self, sight: Sight, pose: Pose) -> list[Level]:
@@ -135,6 +136,8 @@ class TrackedHead:
 
     def _accept(self, sight: Sight, found: Match, last: Pose, dt: float) -> None:
         self._velocity = found.pose.step_from(last) / max(dt, 1e-3)
+        if self._neck is not None:
+            self._neck.update(found.pose, dt)
         self._pose, self._correlation, self._matched_ns = found.pose, found.correlation, sight.stamp_ns
         if found.correlation >= self._config.keyframe_gate and not _hand_near(sight) and self._keyframes.wants(found.pose):
             levels = self._levels(sight, found.pose)
@@ -142,8 +145,10 @@ class TrackedHead:
 
     def _hold(self, dt: float) -> HeadState:
         """Below the gate: hold the pose for a while, then say that it is out of range or lost."""
-        self._velocity = np.zeros(6)
         assert self._pose is not None
+        assert self._neck is not None
+        self._velocity = np.zeros(6)
+        self._neck.rest()
         yaw = self._pose.angles_deg()[0]
         if dt <= self._config.hold_s:
             return self._state(held_s=dt)
