@@ -77,10 +77,15 @@ class Watcher:
         """Publish fusion's belief of a frame."""
         belief = Belief.derive(frame, Producer("fusion", "test"))
         self.unanswered -= 1  # before it goes out: the next frame may be here before `put` returns
-        self.session.put(topics.BELIEF.key(self.robot), codec.encode(belief), encoding=codec.encoding_of(Belief))
+        with contextlib.suppress(zenoh.ZError):  # the test is over and the session closed
+            self.session.put(topics.BELIEF.key(self.robot), codec.encode(belief), encoding=codec.encoding_of(Belief))
 
     def state(self) -> str:
         return self.infos[-1].state if self.infos else ""
+
+    def at_end(self) -> bool:
+        """The camera said that it ended, and its last frame is here: the word, more urgent, may overtake it."""
+        return self.state() == "ended" and bool(self.frames) and self.frames[-1].seq == self.infos[-1].last_seq
 
     def get(self, key: str) -> list[dict[str, Any]]:
         """Replies to a get, as JSON."""
@@ -96,7 +101,9 @@ class Watcher:
         self.most_unanswered = max(self.most_unanswered, self.unanswered)
         self.frames.append(frame)
         if self._answers:
-            threading.Timer(0.01, self.answer, [frame]).start()
+            timer = threading.Timer(0.01, self.answer, [frame])
+            timer.daemon = True
+            timer.start()
 
     def _info(self, sample: zenoh.Sample) -> None:
         self.infos.append(codec.decode(CameraInfo, sample.payload.to_bytes(), str(sample.encoding)))
@@ -156,7 +163,7 @@ def write_film(path: Path, frames: int = 20, rate_hz: float = 25.0) -> Path:
 def test_a_film_is_published_whole_at_its_own_rate_and_its_end_is_said(endpoint: str, tmp_path: Path) -> None:
     film = write_film(tmp_path / "film.mp4")
     with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (camera, watcher):
-        wait_for(lambda: watcher.state() == "ended", "the end")
+        wait_for(watcher.at_end, "the end")
         seqs, stamps = (np.array([getattr(frame, name) for frame in watcher.frames]) for name in ("seq", "stamp_ns"))
         counters = watcher.get(topics.HEALTH.key(watcher.robot, stage="camera"))[0]["counters"]
         assert len(seqs) + counters.get("pictures_skipped", 0) == 20, "a busy machine may skip some, and counts them"
@@ -183,7 +190,7 @@ def test_lockstep_gives_equal_frames_in_two_runs_and_never_two_unanswered(endpoi
     for _ in range(2):
         arguments = ("--lockstep", "--set", f"source={film}")
         with camera_and_watcher(endpoint, tmp_path, *arguments, answers=True, stages=STAGES_BUT_CAMERA) as (_, watcher):
-            wait_for(lambda: watcher.state() == "ended", "the end")
+            wait_for(watcher.at_end, "the end")
             runs.append(watcher.digest())
             infos.append([info.model_copy(update={"instance": ""}) for info in watcher.infos])
             assert watcher.most_unanswered == 1
@@ -201,9 +208,11 @@ def test_lockstep_goes_on_without_answers_and_counts_them(endpoint: str, tmp_pat
     film = write_film(tmp_path / "film.mp4", frames=5)
     arguments = ("--lockstep", "--set", f"source={film}", "--set", "lockstep_timeout_s=0.2")
     with camera_and_watcher(endpoint, tmp_path, *arguments, stages=STAGES_BUT_CAMERA) as (camera, watcher):
-        wait_for(lambda: watcher.state() == "ended", "the end")
+        wait_for(watcher.at_end, "the end")
         wait_for(lambda: watcher.healths[-1].counters.get("lockstep_unanswered", 0) >= 4, "the count")
-        assert [frame.seq for frame in watcher.frames] == list(range(5))
+        assert [frame.seq for frame in watcher.frames] == [0, 0, 0, 1, 2, 3, 4], (
+            "the first one three times: it may have been lost"
+        )
         assert camera.said.count("fusion did not answer") == 1, "said once in ten seconds"
 
 
@@ -216,7 +225,7 @@ def test_lockstep_waits_for_the_stages_that_answer(endpoint: str, tmp_path: Path
             watcher.session.liveliness().declare_token(topics.alive_key(watcher.robot, stage, "test"))
             for stage in STAGES_BUT_CAMERA
         ]
-        wait_for(lambda: watcher.state() == "ended", "the end")
+        wait_for(watcher.at_end, "the end")
         assert [frame.seq for frame in watcher.frames] == [0, 1, 2]
         assert len(tokens) == 4
 
@@ -244,7 +253,8 @@ def test_a_film_that_is_cut_off_plays_to_the_cut_and_health_says_so(endpoint: st
     film = write_film(tmp_path / "film.avi", frames=30)
     film.write_bytes(film.read_bytes()[: film.stat().st_size // 2])
     with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (_, watcher):
-        wait_for(lambda: watcher.state() == "ended" and bool(watcher.healths), "the end")
+        wait_for(watcher.at_end, "the end")
+        wait_for(lambda: bool(watcher.healths), "a heartbeat")
         assert len(watcher.frames) >= 5
         assert f"{watcher.frames[-1].seq + 1} of about 30 frames could be read" in watcher.infos[-1].reason
         wait_for(lambda: watcher.healths[-1].state == "degraded", "the state")
@@ -273,7 +283,7 @@ def test_the_site_file_gives_calibration_and_mount(endpoint: str, tmp_path: Path
         f"camera:\n  source: {film}\n  calibration: cam.yaml\n  mount: {{position_m: [0.1, 0, 1.4], pitch_up_deg: 5}}\n"
     )
     with camera_and_watcher(endpoint, tmp_path, "--site", str(site)) as (_, watcher):
-        wait_for(lambda: watcher.state() == "ended", "the end")
+        wait_for(watcher.at_end, "the end")
         info = watcher.infos[-1]
         assert info.camera_matrix == pytest.approx((150, 0, 79.5, 0, 150, 59.5, 0, 0, 1))
         assert (info.distortion_model, info.distortion) == ("plumb_bob", [0.1, 0, 0, 0, 0])

@@ -40,6 +40,7 @@ class CameraStage:
         self._live = False
         self._started = False
         self._own_rate = OwnRate(0.0)
+        self._first_fed: Ready | None = None
         self._readiness: Readiness | None = None
         self._hold_s = 0.0
         self._info_due_s = 0.0
@@ -113,6 +114,7 @@ class CameraStage:
         """Publish or drop the picture, or leave it for later and say for how long in `_hold_s`."""
         if self._live:
             self._publish(picture, picture.time_ns)
+            self._handoff.drop_first()
         elif not self._others_ready():
             self._hold_s = 0.1
         elif self._node.lockstep:
@@ -133,17 +135,27 @@ class CameraStage:
             if decision.fell_behind:
                 self._node.count("playback_fell_behind")
             self._publish(picture, self._node.now_ns() - decision.late_ns)
+            self._handoff.drop_first()
 
     def _feed(self, picture: Ready) -> None:
         now_s = self._node.monotonic_s()
         if not self._lockstep.may_feed(now_s):
             self._hold_s = 0.1
             return
+        if self._first_fed is not None and self._lockstep.feed_again():
+            self._node.count("lockstep_repeated")
+            self._send_in_step(self._first_fed, now_s)
+            return
         unanswered = self._lockstep.given_up()
         if unanswered is not None:
             self._node.count("lockstep_unanswered")
             limit = self._config.lockstep_timeout_s
             self._node.warn("lockstep", f"fusion did not answer frame {unanswered} within {limit:g} s; the next is fed")
+        self._first_fed = self._first_fed or picture
+        self._send_in_step(picture, now_s)
+        self._handoff.drop_first()
+
+    def _send_in_step(self, picture: Ready, now_s: float) -> None:
         stamp_ns = EPOCH_NS + picture.time_ns
         self._publish(picture, stamp_ns)
         self._lockstep.sent((picture.seq, stamp_ns), now_s)
@@ -170,7 +182,6 @@ class CameraStage:
             self._frames.put(frame)
         self._status.published(picture.seq)
         self._picture_s = self._node.monotonic_s()
-        self._handoff.drop_first()
         self._hold_s = 0.0
 
     def _others_ready(self) -> bool:
