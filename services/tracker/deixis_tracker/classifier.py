@@ -82,10 +82,12 @@ class HandBelief:
 
 def label(beliefs: list[HandBelief], current: list[HandKind]) -> list[HandKind]:
     """Kinds of the tracks of one person, each hand at most once: the assignment of most belief; a change needs a margin."""
-    pool: list[HandKind] = ["left_hand", "right_hand", *(["unknown"] * len(beliefs))]
+    unknown: HandKind = "unknown"
+    pool: list[HandKind] = ["left_hand", "right_hand", *([unknown] * len(beliefs))]
+    choices: list[tuple[HandKind, ...]] = sorted(set(permutations(pool, len(beliefs))))
 
     def worth(kinds: tuple[HandKind, ...]) -> float:
         kept = sum(1.5 for new, old in zip(kinds, current, strict=True) if new == old and old != "unknown")
         return kept + sum(belief.log(kind) for belief, kind in zip(beliefs, kinds, strict=True))
 
-    return list(max(sorted(set(permutations(pool, len(beliefs)))), key=worth))
+    return list(max(choices, key=worth))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
+import cv2.data
 import numpy as np
 from numpy.typing import NDArray
 

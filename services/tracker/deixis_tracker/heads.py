@@ -49,7 +49,7 @@ def ellipse_kernels() -> tuple[Map, Map]:
     radius = np.hypot(x / HALF_WIDTH, y / HALF_HEIGHT)
     inside = np.clip((1.06 - radius) / 0.12, 0, 1).astype(np.float32)
     ring = ((radius > 1.08) & (radius < 1.5) & (y < 0.25)).astype(np.float32)
-    return inside / inside.sum(), ring / ring.sum()
+    return np.asarray(inside / inside.sum(), np.float32), np.asarray(ring / ring.sum(), np.float32)
 
 
 class HeadColours:

@@ -42,7 +42,7 @@ class MotionHistory:
         """Take in the next picture."""
         small = self._small(image)
         moved = cv2.threshold(cv2.absdiff(small, self._last), MOTION_THRESHOLD, 255, cv2.THRESH_BINARY)[1]
-        self.history = np.asarray(cv2.max(cv2.subtract(self.history, MOTION_FADE), moved), np.uint8)
+        self.history = np.asarray(cv2.max(cv2.subtract(self.history, np.full_like(self.history, MOTION_FADE)), moved), np.uint8)
         self._last = small
 
     @staticmethod
@@ -73,7 +73,9 @@ def hand_blobs(
     """Skin-coloured regions that may be hands of the persons, largest first."""
     candidates = cv2.bitwise_and(cv2.inRange(skin, config.skin_low, 255), changed)
     foreground = background.remove_shadow(image, np.asarray(candidates, np.uint8))
-    allowed = cv2.bitwise_or(foreground, background.unknown)
+    # Where the room is not known only the colour speaks, so it has to be sure: trousers, shirts and wood floors are nearly skin.
+    sure = cv2.bitwise_and(background.unknown, cv2.inRange(skin, config.skin_high, 255))
+    allowed = cv2.bitwise_or(foreground, np.asarray(sure, np.uint8))
     allowed[head_zone((skin.shape[0], skin.shape[1]), persons) > 0] = 0
     probability = cv2.bitwise_and(skin, allowed)
     smooth = np.asarray(cv2.medianBlur(probability, 3), np.uint8)

@@ -99,7 +99,8 @@ class Tracker:
         self._frozen = self._people_mask(work.shape[0], work.shape[1])
         self._background.update(work, changed, self._frozen)
         if self._frame % ADAPT_ROOM_EVERY == 10:
-            room = np.asarray(255 - self._frozen, np.uint8)
+            # Clothes count as room: they hide no skin of the colour that is looked for.
+            room = np.where((self._frozen == 0) | (skin < self._config.skin_low), 255, 0).astype(np.uint8)
             self._skin.adapt_room(work, room)
 
     # --- heads --------------------------------------------------------------------------------------------------------
