@@ -95,24 +95,6 @@ def test_lockstep_goes_on_when_no_answer_comes_and_names_the_frame_once() -> Non
     assert lockstep.given_up() is None
 
 
-def test_lockstep_sends_the_first_frame_again_until_something_was_answered_and_no_later_one() -> None:
-    lockstep = Lockstep(2.0)
-    lockstep.sent((0, 1), 0.0)
-    assert lockstep.feed_again()
-    lockstep.sent((0, 1), 2.0)
-    lockstep.answered((0, 1))
-    assert not lockstep.feed_again()
-    lockstep.sent((1, 2), 3.0)
-    assert not lockstep.feed_again(), "it may have been seen: a stage would see it twice"
-
-
-def test_lockstep_sends_the_first_frame_at_most_three_times() -> None:
-    lockstep = Lockstep(2.0)
-    for _ in range(3):
-        lockstep.sent((0, 1), 0.0)
-    assert not lockstep.feed_again()
-
-
 def test_the_first_frame_waits_for_all_stages_and_a_receiver() -> None:
     readiness = Readiness(0.0, 20.0)
     assert not readiness.ready(set(ALL), False, 1.0)

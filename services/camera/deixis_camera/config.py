@@ -69,7 +69,7 @@ class CameraConfig(BaseModel):
         default=20.0, ge=0, le=120, description="Lockstep: longest wait for the other stages before the first frame."
     )
     lockstep_timeout_s: float = Field(
-        default=2.0, ge=0.1, le=60, description="Lockstep: longest wait for fusion's answer to a frame before the next is fed."
+        default=10.0, ge=0.1, le=60, description="Lockstep: longest wait for fusion's answer to a frame before the next is fed."
     )
 
     @field_validator("source", mode="before")

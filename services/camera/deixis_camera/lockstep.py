@@ -8,7 +8,6 @@ EPOCH_NS = 1_000_000_000_000_000_000
 NEEDED = frozenset({"tracker", "fusion"})
 ALL = frozenset({"tracker", "headpose", "gesture", "fusion"})
 REST_S = 3.0
-FIRST_FRAME_TRIES = 3
 
 
 class Lockstep:
@@ -18,31 +17,19 @@ class Lockstep:
         self._timeout_s = timeout_s
         self._open: tuple[int, int] | None = None
         self._sent_s = 0.0
-        self._ever_answered = False
-        self._tries = 0
 
     def sent(self, frame_id: tuple[int, int], now_s: float) -> None:
         """The frame (seq, stamp_ns) was published."""
         self._open, self._sent_s = frame_id, now_s
-        self._tries += 1
 
     def answered(self, frame_id: tuple[int, int]) -> None:
         """fusion/belief of this frame came; one of another frame changes nothing."""
         if frame_id == self._open:
             self._open = None
-            self._ever_answered = True
 
     def may_feed(self, now_s: float) -> bool:
         """The last frame is answered, or its time is up."""
         return self._open is None or now_s - self._sent_s >= self._timeout_s
-
-    def feed_again(self) -> bool:
-        """Whether to send the unanswered first frame once more.
-
-        On a busy machine the first frame of a session got lost on all links at once, in one run of eight, while subscribers
-        stood and matched: two runs were not equal. Later frames are not repeated: a slow stage would see them twice.
-        """
-        return self._open is not None and not self._ever_answered and self._tries < FIRST_FRAME_TRIES
 
     def given_up(self) -> int | None:
         """`seq` of a frame whose answer never came, once; call it when `may_feed` says yes."""

@@ -40,7 +40,6 @@ class CameraStage:
         self._live = False
         self._started = False
         self._own_rate = OwnRate(0.0)
-        self._first_fed: Ready | None = None
         self._readiness: Readiness | None = None
         self._hold_s = 0.0
         self._info_due_s = 0.0
@@ -142,23 +141,15 @@ class CameraStage:
         if not self._lockstep.may_feed(now_s):
             self._hold_s = 0.1
             return
-        if self._first_fed is not None and self._lockstep.feed_again():
-            self._node.count("lockstep_repeated")
-            self._send_in_step(self._first_fed, now_s)
-            return
         unanswered = self._lockstep.given_up()
         if unanswered is not None:
             self._node.count("lockstep_unanswered")
             limit = self._config.lockstep_timeout_s
             self._node.warn("lockstep", f"fusion did not answer frame {unanswered} within {limit:g} s; the next is fed")
-        self._first_fed = self._first_fed or picture
-        self._send_in_step(picture, now_s)
-        self._handoff.drop_first()
-
-    def _send_in_step(self, picture: Ready, now_s: float) -> None:
         stamp_ns = EPOCH_NS + picture.time_ns
         self._publish(picture, stamp_ns)
         self._lockstep.sent((picture.seq, stamp_ns), now_s)
+        self._handoff.drop_first()
 
     def _publish(self, picture: Ready, stamp_ns: int) -> None:
         encoded, producer = picture.encoded, self._node.producer

@@ -22,6 +22,9 @@ class FusionConfig(BaseModel):
 
     # joining
     age_limit_s: float = Field(default=0.3, gt=0, le=10, description="A frame is answered without stages that take longer.")
+    lockstep_age_limit_s: float = Field(
+        default=5.0, gt=0, le=60, description="The same in lockstep, where a slow machine must not change the answers."
+    )
     dead_after_s: float = Field(default=1.5, gt=0, le=60, description="A silent stage without liveliness is dead after this.")
     jump_back_s: float = Field(
         default=1.0, gt=0, le=60, description="Stamps that fall back by more are a new run of the camera."

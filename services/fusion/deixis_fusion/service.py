@@ -38,7 +38,7 @@ class FusionService:
         self._node = node
         self._registry = registry
         self._fusion = Fusion(config, node.producer)
-        self._joiner = FrameJoiner(config.age_limit_s, config.jump_back_s)
+        self._joiner = FrameJoiner(config.lockstep_age_limit_s if node.lockstep else config.age_limit_s, config.jump_back_s)
         self._monitor = SourceMonitor((*STAGES, "camera"), config.dead_after_s)
         self._end = SourceEnd(config.source_silent_s)
         self._edits = PoiEdits(registry, topics.POI.key(node.robot, id=""))
@@ -74,7 +74,7 @@ class FusionService:
                 if self._joiner.add(part, now_s):
                     self._finish_episodes()
         self._monitor.update(self._readings(), now_s)
-        for frame in self._joiner.due(now_s, () if self._node.lockstep else self._monitor.dead()):
+        for frame in self._joiner.due(now_s, self._monitor.dead()):
             self._answer_frame(frame, now_s)
         camera_waits = self._node.lockstep and "camera" in self._node.alive_stages()
         if self._end.is_over(now_s, camera_waits):
