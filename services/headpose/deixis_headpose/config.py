@@ -21,7 +21,7 @@ class HeadposeConfig(BaseModel):
     )
 
     head_semi_axes_m: tuple[float, float, float] = Field(
-        default=(0.080, 0.115, 0.095), description="Semi-axes of the head's ellipsoid: across, up, along, metres."
+        default=(0.080, 0.115, 0.085), description="Semi-axes of the head's ellipsoid: across, up, along, metres."
     )
     surface_points: int = Field(default=900, ge=200, le=10000, description="Points spread over the whole ellipsoid.")
     working_width_px: float = Field(default=64.0, ge=24, le=400, description="Heads wider than this are scaled down, pixels.")

@@ -17,7 +17,7 @@ from .patch import Level
 
 HUBER = 1.345
 MIN_POINTS = 40
-INDEPENDENT = 0.005
+INDEPENDENT = 0.0075
 """Share of the residuals that counts as independent: neighbouring ones are model error and move together."""
 MIN_NOISE = 1.5
 """Grey levels: below it a residual is quantisation."""
