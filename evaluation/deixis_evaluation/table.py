@@ -43,7 +43,7 @@ def clip_table(scores: Sequence[ClipScore]) -> Table:
 
 
 def yaw_table(bands: dict[str, YawBand]) -> Table:
-    """One row for each band of the true yaw."""
+    """One row for each band of the true yaw. Side counts where the frontal face is out of sight, and not before."""
     table = Table(box=box.SIMPLE_HEAD, title="Head yaw, by true yaw in degrees", title_justify="left")
     for name in (
         "band",
@@ -64,7 +64,7 @@ def yaw_table(bands: dict[str, YawBand]) -> Table:
             number(band.mae_deg, "°"),
             percent(band.large_error_share),
             percent(band.share(band.out_of_range)),
-            percent(band.share(band.said_or_side)),
+            percent(band.share(band.said_or_side)) if name == "over_90" else "",
             percent(band.share(band.silent)),
         )
     return table
