@@ -90,4 +90,4 @@ def label(beliefs: list[HandBelief], current: list[HandKind]) -> list[HandKind]:
         kept = sum(1.5 for new, old in zip(kinds, current, strict=True) if new == old and old != "unknown")
         return kept + sum(belief.log(kind) for belief, kind in zip(beliefs, kinds, strict=True))
 
-    return list(max(choices, key=worth))
+    return list(choices[max(range(len(choices)), key=lambda k: worth(choices[k]))])

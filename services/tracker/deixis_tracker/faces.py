@@ -25,7 +25,7 @@ SCALE_STEP = 1.17
 VERIFY_PX = 32  # a face that is looked at again is scaled to this width
 MISSES_ALLOWED = 3
 LEAST_SKIN = 0.12
-SEARCH_EVERY_WITH_FACE = 4  # frames, once somebody is tracked
+SEARCH_EVERY_WITH_FACE = 3  # frames, once somebody is tracked
 
 
 class Job(NamedTuple):
@@ -87,12 +87,13 @@ class FaceDetector:
         self._jobs = plan_jobs(height, width, config)
         self._next = 0
         self._frame = 0
+        self.searched_all = False
         self.candidates: list[Candidate] = []
 
     def search(self, grey: Image, skin: Image, tracked: int) -> None:
         """Do the jobs of this frame; new hits become candidates. `skin`: P(skin) as uint8; `tracked`: number of faces known."""
         self._frame += 1
-        if tracked and self._frame % SEARCH_EVERY_WITH_FACE:
+        if tracked and self.searched_all and self._frame % SEARCH_EVERY_WITH_FACE:
             return
         left = self._config.search_budget_mpx
         for _ in range(len(self._jobs)):
@@ -100,6 +101,7 @@ class FaceDetector:
             if job.megapixels > left:
                 break
             self._next = (self._next + 1) % len(self._jobs)
+            self.searched_all |= self._next == 0
             left -= job.megapixels * self._run(job, grey, skin)
 
     def look_again(self, grey: Image, x: float, y: float, width: float) -> Box | None:

@@ -38,7 +38,9 @@ def geodesic(mask: Mask, seed: tuple[int, int]) -> NDArray[np.float32]:
     reached[seed[1], seed[0]] = 1
     distance[seed[1], seed[0]] = 0
     for step in range(1, mask.size):
-        grown = np.asarray(cv2.dilate(reached, SQUARE if step % 2 else CROSS), np.uint8) & mask  # alternating: an octagon, nearly a circle
+        grown = (
+            np.asarray(cv2.dilate(reached, SQUARE if step % 2 else CROSS), np.uint8) & mask
+        )  # alternating: an octagon, nearly a circle
         fresh = grown > reached
         if not fresh.any():
             break

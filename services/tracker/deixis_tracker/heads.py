@@ -81,7 +81,7 @@ class HeadColours:
 
 
 def _histogram(part: Image, mask: Image) -> Map:
-    counts = cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3)
+    counts: Map = np.asarray(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3), np.float32)
     for axis in range(3):
         moved = np.moveaxis(counts, axis, 0)
         padded = np.concatenate([moved[:1], moved, moved[-1:]])

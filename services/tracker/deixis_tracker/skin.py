@@ -24,7 +24,10 @@ OFFSET = 6.0  # keeps the ratios of dark pixels, which are mostly noise, near 1
 # Spread that is always granted to a person's skin: hands are lit otherwise than the face, and palms are paler.
 SPREAD_FLOOR = np.diag([0.075**2, 0.075**2, 0.55**2])
 PERSON_SHARE = 0.75
-ROOM_SHARE = 0.6
+ROOM_SHARE = 0.5
+CLOTHES_SHARE = 0.35
+# A palm held toward a lamp runs into the limit of the sensor and turns nearly white: it may extend a blob, not start one.
+OVEREXPOSED_SKIN = 0.45
 
 
 def chroma_features(bgr: Array) -> Array:
@@ -55,6 +58,11 @@ def _table_colours() -> Array:
     return np.stack([b.ravel(), g.ravel(), r.ravel()], axis=1)
 
 
+def _overexposed_skin(bgr: Array) -> NDArray[np.bool_]:
+    b, g, r = bgr.T
+    return np.asarray((r > 244) & (g > 180) & (b > 140) & (r > b) & (g >= b), np.bool_)
+
+
 class SkinModel:
     """P(skin | colour) as a table. `adapt_person` and `adapt_room` change it; `probability` applies it."""
 
@@ -68,6 +76,8 @@ class SkinModel:
         self._person: dict[int, tuple[Array, Array]] = {}
         self._person_density: dict[int, Array] = {}
         self._room: Array | None = None
+        self._clothes: dict[int, Array] = {}
+        self._overexposed = _overexposed_skin(_table_colours())
         self._table = self._posterior()
 
     def probability(self, image: Image) -> Image:
@@ -95,17 +105,33 @@ class SkinModel:
 
     def adapt_room(self, image: Image, room: Mask) -> None:
         """Learn the colours of the room, where `room` (H, W) is not 0: what is no skin here."""
-        counts = cv2.calcHist([image], [0, 1, 2], room, [BINS] * 3, [0, 256] * 3).astype(np.float64)
-        if counts.sum() < 100:
+        density = self._density_of(image, room)
+        if density is None:
             return
-        counts = _smooth(counts) / counts.sum()
-        density = counts.ravel() / self._volume
         self._room = density if self._room is None else 0.7 * self._room + 0.3 * density
         self._table = self._posterior()
+
+    def adapt_clothes(self, person_id: int, torso: Image) -> None:
+        """Learn the colours of a person's clothes from a piece of the picture (H, W, 3): a brown shirt is nearly skin."""
+        density = self._density_of(torso, None)
+        if density is None:
+            return
+        known = self._clothes.get(person_id)
+        self._clothes[person_id] = density if known is None else 0.7 * known + 0.3 * density
+        self._table = self._posterior()
+
+    def _density_of(self, image: Image, mask: Mask | None) -> Array | None:
+        if image.size == 0:
+            return None
+        counts = cv2.calcHist([image], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3).astype(np.float64)
+        if counts.sum() < 100:
+            return None
+        return np.asarray((_smooth(counts) / counts.sum()).ravel() / self._volume, np.float64)
 
     def forget_person(self, person_id: int) -> None:
         """Drop the colour of a person who left."""
         self._person.pop(person_id, None)
+        self._clothes.pop(person_id, None)
         if self._person_density.pop(person_id, None) is not None:
             self._table = self._posterior()
 
@@ -116,8 +142,12 @@ class SkinModel:
             skin = (1 - PERSON_SHARE) * skin + PERSON_SHARE * person
         if self._room is not None:
             other = (1 - ROOM_SHARE) * other + ROOM_SHARE * self._room
+        if self._clothes:
+            other = (1 - CLOTHES_SHARE) * other + CLOTHES_SHARE * np.max(list(self._clothes.values()), axis=0)
         joint = self._prior * skin
         posterior = joint / np.maximum(joint + (1 - self._prior) * other, 1e-12)
+        if self._person:
+            posterior = np.where(self._overexposed, np.maximum(posterior, OVEREXPOSED_SKIN), posterior)
         return (255 * posterior).reshape(BINS, BINS, BINS).astype(np.uint8)
 
     def _cell_volume(self) -> Array:

@@ -31,7 +31,7 @@ LEAST_SIDE_PX = 32
 HEAD_ACCELERATION = 25.0  # face widths per second squared
 HAND_ACCELERATION = 60.0
 HEAD_CENTRE_BELOW_HAAR = -0.04  # the centre of a Haar box lies so far below the head's centre, face widths
-WIDTH_OF_HAAR = 1.02
+WIDTH_OF_HAAR = 0.96
 LOOK_AGAIN_EVERY = 5  # frames
 ADAPT_SKIN_EVERY = 15
 ADAPT_ROOM_EVERY = 45
@@ -140,6 +140,14 @@ class Tracker:
         w = person.width
         rows, columns = around(person.x, person.y, 0.27 * w, 0.1 * w, 0.27 * w, 0.42 * w).window(*work.shape[:2])
         self._skin.adapt_person(person.person_id, work[rows, columns].reshape(-1, 3), 0.2)
+        if self._raised_before_torso(person):
+            return
+        rows, columns = around(person.x, person.y + 2.3 * w, 0.6 * w, 0.7 * w, 0.6 * w, 0.7 * w).window(*work.shape[:2])
+        self._skin.adapt_clothes(person.person_id, work[rows, columns])
+
+    def _raised_before_torso(self, person: Person) -> bool:
+        w = person.width
+        return any(abs(h.motion.x - person.x) < 1.4 * w and h.motion.y - person.y < 3.8 * w for h in person.hands)
 
     def _hand_before(self, person: Person) -> bool:
         w = person.width
@@ -288,7 +296,7 @@ class Tracker:
         kept = []
         for hand in person.hands:
             if hand.blob is None:
-                hand.motion.damp(0.85)
+                hand.motion.damp(0.6)
             near = np.hypot(hand.motion.x - person.x, hand.motion.y - person.y) < 1.3 * self._config.reach * w
             inside = 0 <= hand.motion.x < width and 0 <= hand.motion.y < height
             if near and inside and now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9:
