@@ -13,6 +13,8 @@ from deixis_schemas.messages import Health, Message, State
 T = TypeVar("T", bound=Message)
 
 TIMEOUT_S = 1.5
+# Zenoh's own error reply for somebody who should have answered and did not.
+TIMED_OUT = b"Timeout"
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ def get_all(
     encoding: str | None = None,
     timeout_s: float = TIMEOUT_S,
 ) -> tuple[list[tuple[str, T]], list[Refusal]]:
-    """All replies to a get: the messages with their keys, and the refusals."""
+    """All replies to a get: the messages with their keys, and the refusals. Silence is neither."""
     replies = session.get(
         selector,
         payload=payload,
@@ -46,7 +48,9 @@ def get_all(
     bad: list[Refusal] = []
     for reply in replies:
         if reply.ok is None:
-            bad.append(Refusal(selector, reply.err.payload.to_bytes().decode("utf-8", "replace") if reply.err else ""))
+            error = reply.err.payload.to_bytes() if reply.err else b""
+            if error != TIMED_OUT:
+                bad.append(Refusal(selector, error.decode("utf-8", "replace")))
             continue
         key = str(reply.ok.key_expr)
         try:

@@ -26,6 +26,7 @@ log = logging.getLogger("deixis-supervisor")
 READY_TIMEOUT_S = 30.0
 POLL_S = 0.05
 HANGS_AFTER_S = 6.0
+BLIND_AFTER_S = 3.0
 LOCKSTEP_INSTANCE = "lockstep"
 
 
@@ -76,6 +77,7 @@ class Host:
         self._stack = ExitStack()
         self._alive: set[str] = set()
         self._beats: dict[int, tuple[int, float]] = {}
+        self._polled_s = time.monotonic()
         self._declared: list[object] = []
         self._stopped: Callable[[], bool] = lambda: False
 
@@ -111,6 +113,10 @@ class Host:
         """Watch the children; call it a few times a second. Raises HostFailed when one is given up."""
         self.supervisor.poll()
         now = time.monotonic()
+        # Without a link, or when we ourselves stood still, silence says nothing of the stages.
+        if now - self._polled_s > BLIND_AFTER_S or not self.session.info.routers_zid():
+            self._beats.clear()
+        self._polled_s = now
         for process in self.supervisor.processes.values():
             beat = self._beats.get(process.popen.pid) if process.popen else None
             if beat and process.running and now - beat[1] > HANGS_AFTER_S:

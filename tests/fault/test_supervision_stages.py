@@ -1,0 +1,197 @@
+"""Stages that die, hang or are misconfigured, under `deixis up` and `deixis run`."""
+
+import os
+import signal
+import subprocess
+import uuid
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from deixis_cli.gets import get_healths
+from deixis_runtime.session import open_client
+from running import answers, command, free_port, process, tail, wait_until
+
+STAGES = "camera,fusion"  # the two that start quickest
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """A folder of small pictures to play."""
+    folder = tmp_path_factory.mktemp("pictures")
+    for index in range(5):
+        cv2.imwrite(str(folder / f"{index}.png"), np.full((72, 96, 3), 40 * index, np.uint8))
+    return folder
+
+
+@pytest.fixture
+def endpoint(free_port):
+    return f"tcp/127.0.0.1:{free_port}"
+
+
+@pytest.fixture(scope="module")
+def lasting_up(tmp_path_factory, pictures):
+    """One system for the tests that leave it running."""
+    with running_up(tmp_path_factory.mktemp("up"), pictures) as it:
+        yield it
+
+
+@pytest.fixture
+def up(tmp_path, pictures):
+    """A system that the test may end."""
+    with running_up(tmp_path, pictures) as it:
+        yield it
+
+
+@contextmanager
+def running_up(folder, pictures):
+    """`deixis up` of camera and fusion on the pictures, again and again; with a session of ours."""
+    robot, endpoint, log = f"test-{uuid.uuid4().hex[:8]}", f"tcp/127.0.0.1:{free_port()}", folder / "log"
+    with process(up_command(robot, endpoint, pictures), log) as child:
+        wait_until(lambda: child.poll() is not None or answers(endpoint), "a router", 30, log)
+        assert child.poll() is None, tail(log)
+        with open_client(endpoint, shared_memory=False) as session:
+            it = Up(child, log, robot, endpoint, session)
+            it.wait_for_pid("camera")  # the last to start
+            yield it
+
+
+def up_command(robot, endpoint, pictures, *arguments):
+    options = ["--robot", robot, "--listen", endpoint, "--only", STAGES]
+    camera = ["--set", f"camera.source={pictures}", "--set", "camera.loop=true", "--set", "camera.rate_hz=20"]
+    return command("deixis", "up", *options, *camera, *arguments)
+
+
+class Up:
+    def __init__(self, child, log, robot, endpoint, session):
+        self.child, self.log, self.robot, self.endpoint, self.session = child, log, robot, endpoint, session
+
+    def health(self, stage):
+        """The stage's health as it answers now; None while it does not."""
+        answers = [health for health in get_healths(self.session, self.robot, 1.0) if health.stage == stage]
+        return answers[0] if answers else None
+
+    def wait_for_pid(self, stage, other_than=None):
+        """The process number of the stage, once it answers with another than this."""
+
+        def pid():
+            health = self.health(stage)
+            return health.pid if health and health.pid != other_than else None
+
+        return wait_until(pid, f"{stage} answers", 30, self.log)
+
+    def frames(self):
+        health = self.health("camera")
+        return sum(item.published for item in health.outputs if item.key.endswith("/camera/frame")) if health else 0
+
+
+def children(pid):
+    """Process numbers of the children of a process."""
+    return [int(line) for line in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def runs(pid):
+    """Whether a process is there and not a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def test_a_killed_stage_is_started_again_and_the_system_goes_on(lasting_up):
+    up = lasting_up
+    fusion = up.wait_for_pid("fusion")
+    os.kill(fusion, signal.SIGKILL)
+    up.wait_for_pid("fusion", other_than=fusion)
+    assert up.child.poll() is None
+    before = up.frames()
+    wait_until(lambda: up.frames() > before + 5, "more frames", 10, up.log)
+    assert "fusion ended (killed by SIGKILL); starting it again" in up.log.read_text()
+
+
+def test_a_stopped_stage_is_noticed_and_replaced(lasting_up):
+    up = lasting_up
+    fusion = up.wait_for_pid("fusion")
+    # Its second heartbeat is what the supervisor times it by.
+    wait_until(lambda: (health := up.health("fusion")) and health.count >= 3, "heartbeats", 20, up.log)
+    os.kill(fusion, signal.SIGSTOP)
+    up.wait_for_pid("fusion", other_than=fusion)
+    assert "fusion gives no heartbeat" in up.log.read_text()
+    assert not runs(fusion)
+
+
+def test_sigterm_ends_all_children_in_good_order_within_five_seconds(up):
+    started = children(up.child.pid)
+    assert len(started) == 3, "router, fusion, camera"
+    up.child.send_signal(signal.SIGTERM)
+    assert up.child.wait(5) == 0
+    assert not [pid for pid in started if runs(pid)]
+
+
+def test_a_killed_supervisor_leaves_no_orphan_after_three_seconds(up, wait_for):
+    started = children(up.child.pid)
+    assert len(started) == 3, "router, fusion, camera"
+    up.child.kill()
+    wait_for(lambda: not [pid for pid in started if runs(pid)], "all children are gone", 3.0)
+
+
+def test_a_killed_router_is_started_again_and_its_stages_come_back(lasting_up):
+    up = lasting_up
+    camera = up.wait_for_pid("camera")
+    router = next(
+        pid for pid in children(up.child.pid) if b"deixis_runtime.router" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    )
+    os.kill(router, signal.SIGKILL)
+    wait_until(lambda: "router ended (killed by SIGKILL)" in up.log.read_text(), "it is noticed", 10, up.log)
+    assert up.wait_for_pid("camera") == camera, "the camera itself went on"
+    assert up.child.poll() is None
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("fusion.no_such_setting=1", "no_such_setting: Extra inputs are not permitted"),
+        ("camera.quality=1000", "settings of camera: quality"),
+        ("camera.source", "not of the form STAGE.NAME=VALUE"),
+    ],
+)
+def test_wrong_settings_end_the_run_with_one_clear_error(setting, said, robot, endpoint, pictures):
+    argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", STAGES, "--set", setting)
+    ended = subprocess.run(argv, capture_output=True, text=True, timeout=30, check=False)
+    assert ended.returncode == 1
+    assert said in ended.stderr
+    assert ended.stderr.count(said) == 1
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_taken_port_is_said_with_the_way_out(lasting_up, robot, pictures):
+    endpoint = lasting_up.endpoint
+    argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", "camera")
+    ended = subprocess.run(argv, capture_output=True, text=True, timeout=30, check=False)
+    assert ended.returncode == 1
+    assert "cannot listen on" in ended.stderr
+    assert endpoint in ended.stderr
+    assert "Choose --listen" in ended.stderr
+    assert lasting_up.child.poll() is None
+
+
+def test_a_missing_source_is_said_before_anything_starts(robot, endpoint):
+    argv = command("deixis", "run", "nowhere.mp4", "--robot", robot, "--listen", endpoint)
+    ended = subprocess.run(argv, capture_output=True, text=True, timeout=10, check=False)
+    assert ended.returncode == 1
+    assert len(ended.stderr.splitlines()) == 1
+    assert "nowhere.mp4': no such file or folder" in ended.stderr
+    assert not answers(endpoint)
+
+
+def test_a_source_that_is_no_video_ends_the_run_with_its_cause(tmp_path, robot, endpoint):
+    (tmp_path / "notes.mp4").write_bytes(b"this is not a video\n" * 50)
+    argv = command(
+        "deixis", "run", tmp_path / "notes.mp4", "--robot", robot, "--listen", endpoint, "--only", "camera", "--json"
+    )
+    ended = subprocess.run(argv, capture_output=True, text=True, timeout=30, check=False)
+    assert ended.returncode == 1
+    assert "deixis run: " in ended.stderr
+    assert "notes.mp4" in ended.stderr
