@@ -2,9 +2,9 @@
 
     python fit_skin_prior.py Skin_NonSkin.txt CLIPS
 
-reads the UCI Skin Segmentation set (text, B G R label; CC BY 4.0) and a folder of labelled clips (NAME.mp4 with NAME_labels.npz, PNG label
-images with the skin bit 16), and fits one mixture of Gaussians to skin and one to everything else in the space of
-`deixis_tracker.skin.chroma_features`. Both sources weigh the same. Deterministic.
+reads the UCI Skin Segmentation set (text, B G R label; CC BY 4.0) and a folder of labelled clips (NAME.mp4 with
+NAME_labels.npz, PNG label images with the skin bit 16), and fits one mixture of Gaussians to skin and one to everything
+else in the space of `deixis_tracker.skin.chroma_features`. Both sources weigh the same. Deterministic.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Background subtraction that does not swallow a person who stands still (Pateraki et al. 2011, sec. 4, [2]).
 
-A running mean of the room, frozen under tracked people. A person who stands there from the first frame is part of that mean;
-such a place is marked unknown: no change there says nothing. A change of the light moves most of the picture at once: one gain per
-channel is fitted to the room first, and what the gain cannot explain is relearned quickly when it covers much of the picture.
+A running mean of the room, frozen under tracked people. A person who stands there from the first frame is part of that
+mean; such a place is marked unknown: no change there says nothing. A change of the light moves most of the picture at once:
+one gain per channel is fitted to the room first, and what the gain cannot explain is relearned quickly when it covers much
+of the picture.
 """
 
 from __future__ import annotations

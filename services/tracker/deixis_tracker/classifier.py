@@ -1,9 +1,10 @@
 """Incremental probabilistic classifier of hand blobs (after Pateraki et al. 2011, sec. 4, [3]).
 
-Each frame adds the log likelihoods of what was measured (place relative to the face, size, foreground evidence, speed) to the
-belief over left hand, right hand and unknown. Frames in a row say nearly the same thing, so each counts only for a fraction, and
-old evidence fades. Left and right are the person's own: the left hand hangs at the image's right of the face. A hand hanging at its side says much
-about its side, a raised one little, for arms cross the body: so the label of an arm that is raised comes from where it was.
+Each frame adds the log likelihoods of what was measured (place relative to the face, size, foreground evidence, speed) to
+the belief over left hand, right hand and unknown. Frames in a row say nearly the same thing, so each counts only for a
+fraction, and old evidence fades. Left and right are the person's own: the left hand hangs at the image's right of the face.
+A hand hanging at its side says much about its side, a raised one little, for arms cross the body: so the label of an arm
+that is raised comes from where it was.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Finds faces with Haar cascades (Viola and Jones 2001) within a bounded share of each frame's time.
 
-A full search of a VGA picture takes about 100 ms, so it is cut into jobs (one scale, one strip of the picture) and each frame does a few.
-Hits become candidates which are looked at again in the next frames, in their neighbourhood only; single hits land on shirts and
-furniture, so a face is believed after several hits in separate frames, with skin in its middle.
+A full search of a VGA picture takes about 100 ms, so it is cut into jobs (one scale, one strip of the picture) and each
+frame does a few. Hits become candidates which are looked at again in the next frames, in their neighbourhood only; single
+hits land on shirts and furniture, so a face is believed after several hits in separate frames, with skin in its middle.
 """
 
 from __future__ import annotations

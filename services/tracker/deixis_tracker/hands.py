@@ -1,7 +1,8 @@
 """Cuts the hand from a blob of hand and bare forearm.
 
-With short sleeves the skin blob is the whole arm. The hand is its far end: about one face width along the blob from the tip, where the
-tip is the point farthest along the blob (geodesically, for elbows are bent) from where the arm comes from, the shoulder.
+With short sleeves the skin blob is the whole arm. The hand is its far end: about one face width along the blob from the
+tip, where the tip is the point farthest along the blob (geodesically, for elbows are bent) from where the arm comes from,
+the shoulder.
 """
 
 from __future__ import annotations
@@ -60,9 +61,9 @@ def cut_hand(
 ) -> Hand:
     """The hand at the far end of a blob.
 
-    `mask` (0 or 1) is a window at (x0, y0) that holds one blob; `shoulder` is where the arm starts, `length` that of a hand in face
-    widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm held up in
-    front of the shoulder has its hand at the near end.
+    `mask` (0 or 1) is a window at (x0, y0) that holds one blob; `shoulder` is where the arm starts, `length` that of a hand in
+    face widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm
+    held up in front of the shoulder has its hand at the near end.
     """
     factor = min(1.0, CELLS_PER_WIDTH / face_width_px)
     small = mask if factor == 1 else _shrink(mask, factor)

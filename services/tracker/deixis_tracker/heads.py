@@ -1,9 +1,9 @@
 """Follows a head through turns, when no frontal face is to be seen.
 
-A head is hair and skin in front of something else. From the picture in which its face was found, the colours inside the head's ellipse
-and around it are learned; in each frame an ellipse with a bright inside and a dark outside (above and beside the head; below are
-neck and shirt) is laid over the map of P(head | colour), and the best place near the prediction is the head. Profile and
-back of the head keep colour and outline, so the centre stays that of the head through any turn.
+A head is hair and skin in front of something else. From the picture in which its face was found, the colours inside the
+head's ellipse and around it are learned; in each frame an ellipse with a bright inside and a dark outside (above and beside
+the head; below are neck and shirt) is laid over the map of P(head | colour), and the best place near the prediction is the
+head. Profile and back of the head keep colour and outline, so the centre stays that of the head through any turn.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from deixis_tracker.colour_table import look_up
 Image = NDArray[np.uint8]
 Map = NDArray[np.float32]
 
-# Published width W: that of a Haar box, 0.182 m (1.12 times chin-to-brow, ear-to-ear truth); the head is W wide and 1.36 W high.
+# Published width W: that of a Haar box, 0.182 m (1.12 times chin-to-brow, ear-to-ear truth); the head is W wide and
+# 1.36 W high.
 HALF_WIDTH, HALF_HEIGHT = 0.5, 0.68
 CELLS_PER_WIDTH = 16
 SEARCH = 0.55  # face widths around the prediction
@@ -47,7 +48,7 @@ def ellipse_kernels() -> tuple[Map, Map]:
     """(inside, around) kernels at CELLS_PER_WIDTH cells per face width, each summing to 1."""
     x, y = _grid(CELLS_PER_WIDTH, CELLS_PER_WIDTH)
     radius = np.hypot(x / HALF_WIDTH, y / HALF_HEIGHT)
-    inside = np.clip((1.06 - radius) / 0.12, 0, 1).astype(np.float32)
+    inside: Map = np.clip((1.06 - radius) / 0.12, 0, 1).astype(np.float32)
     ring = ((radius > 1.08) & (radius < 1.5) & (y < 0.25)).astype(np.float32)
     return np.asarray(inside / inside.sum(), np.float32), np.asarray(ring / ring.sum(), np.float32)
 
@@ -81,7 +82,8 @@ class HeadColours:
 
 
 def _histogram(part: Image, mask: Image) -> Map:
-    counts: Map = np.asarray(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3), np.float32)
+    """Share of each colour, smoothed over neighbouring bins."""
+    counts: NDArray[np.float64] = np.asarray(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3), np.float64)
     for axis in range(3):
         moved = np.moveaxis(counts, axis, 0)
         padded = np.concatenate([moved[:1], moved, moved[-1:]])

@@ -1,7 +1,8 @@
 """Propagated pixel hypotheses (Pateraki et al. 2011, sec. 4, [1]).
 
-Pixels of a track's last blob, moved by its Kalman state and spread by its uncertainty, are hypotheses of where its pixels are now.
-Their density says how much an observed skin pixel belongs to that track, also where two objects have grown into one blob.
+Pixels of a track's last blob, moved by its Kalman state and spread by its uncertainty, are hypotheses of where its pixels
+are now. Their density says how much an observed skin pixel belongs to that track, also where two objects have grown into
+one blob.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ def sample_pixels(mask: NDArray[np.uint8], x0: int, y0: int) -> Points:
 
 
 def propagate(pixels: Points, dx: float, dy: float, sigma_px: float, height: int, width: int) -> Density:
-    """Density of `pixels` moved by (dx, dy) and spread by `sigma_px`, per cell of CELL x CELL pixels; sums to 1 inside the picture."""
-    cells = ((pixels + (dx, dy)) / CELL).astype(np.int64)
+    """Density of `pixels` moved by (dx, dy) and spread by `sigma_px`, per cell of CELL x CELL pixels; its sum is 1."""
+    cells = ((pixels + np.array([dx, dy], np.float32)) / CELL).astype(np.int64)
     rows, columns = height // CELL + 1, width // CELL + 1
     inside = (cells[:, 0] >= 0) & (cells[:, 0] < columns) & (cells[:, 1] >= 0) & (cells[:, 1] < rows)
     flat = cells[inside, 1] * columns + cells[inside, 0]

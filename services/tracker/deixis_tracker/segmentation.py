@@ -73,7 +73,8 @@ def hand_blobs(
     """Skin-coloured regions that may be hands of the persons, largest first."""
     candidates = cv2.bitwise_and(cv2.inRange(skin, config.skin_low, 255), changed)
     foreground = background.remove_shadow(image, np.asarray(candidates, np.uint8))
-    # Where the room is not known only the colour speaks, so it has to be sure: trousers, shirts and wood floors are nearly skin.
+    # Where the room is not known only the colour speaks, so it has to be sure: trousers, shirts and wood floors are
+    # nearly skin.
     sure = cv2.bitwise_and(background.unknown, cv2.inRange(skin, config.skin_high, 255))
     allowed = cv2.bitwise_or(foreground, np.asarray(sure, np.uint8))
     allowed[head_zone((skin.shape[0], skin.shape[1]), persons) > 0] = 0

@@ -1,9 +1,9 @@
 """Bayesian skin colour: P(skin | colour), adapted to the person and the room (Pateraki et al. 2011, sec. 4, [2]).
 
-Colours are judged in a space of log ratios, log(R/G) and log(G/B), which a change of brightness leaves alone, with the log of
-the brightness as a weak third axis. The densities of skin and of everything else are mixtures of Gaussians (`skin_prior.py`); the
-skin of a detected face and the colours of the room are mixed in. The posterior lives in a table of 32 x 32 x 32 colours, so a
-frame costs one look-up per pixel.
+Colours are judged in a space of log ratios, log(R/G) and log(G/B), which a change of brightness leaves alone, with the log
+of the brightness as a weak third axis. The densities of skin and of everything else are mixtures of Gaussians
+(`skin_prior.py`); the skin of a detected face and the colours of the room are mixed in. The posterior lives in a table of
+32 x 32 x 32 colours, so a frame costs one look-up per pixel.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Colour of skin and of everything else, before anything is known of the person or the room.
 
-Fitted by `fit_skin_prior.py` (beside this package) to the UCI Skin Segmentation set and to rendered clips, skin tones from very dark to
-very light. Axes: log(R/G), log(G/B), log brightness (`skin.chroma_features`).
+Fitted by `fit_skin_prior.py` (beside this package) to the UCI Skin Segmentation set and to rendered clips, skin tones from
+very dark to very light. Axes: log(R/G), log(G/B), log brightness (`skin.chroma_features`).
 """
 
 from __future__ import annotations

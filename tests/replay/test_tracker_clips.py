@@ -1,0 +1,54 @@
+import json
+
+import cv2
+import numpy as np
+import pytest
+from deixis_tracker.config import TrackerConfig
+from deixis_tracker.tracker import Tracker
+
+PERIOD_NS = 33_333_333
+
+
+def frames_of(path, first=0, count=None):
+    capture = cv2.VideoCapture(str(path))
+    for index in range(first + (count or 10**6)):
+        ok, image = capture.read()
+        if not ok:
+            return
+        if index >= first:
+            yield index, image
+
+
+def holds(box, point):
+    return box[0] <= point[0] <= box[0] + box[2] and box[1] <= point[1] <= box[1] + box[3]
+
+
+def test_face_and_pointing_hand_of_a_clip_are_found(rendered):
+    truth = json.loads((rendered / "k08_point_m100_gain80.json").read_text())["frames"]
+    tracker = Tracker(TrackerConfig())
+    faces = hands = raised = 0
+    for index, image in frames_of(rendered / "k08_point_m100_gain80.mp4", count=76):
+        tracks = tracker.update(image, index * PERIOD_NS)
+        person = truth[index]["persons"][0]
+        faces += any(t.kind == "face" and holds(person["face"]["bbox_visible"], t.centroid_px) for t in tracks)
+        if person["phase"] == "stroke":
+            raised += 1
+            centre = np.array(person["hands"]["right"]["centroid_visible_px"])
+            hands += any(t.kind == "right_hand" and np.hypot(*(centre - t.centroid_px)) < 15 for t in tracks)
+    assert faces >= 0.95 * 76
+    assert raised > 10
+    assert hands >= 0.9 * raised
+
+
+def test_an_empty_room_with_flickering_light_has_nobody_in_it(rendered):
+    tracker = Tracker(TrackerConfig())
+    assert not any(tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / "a09_empty_flicker.mp4"))
+
+
+@pytest.mark.parametrize("name", ["c19_point_m40_crossarm"])
+def test_two_runs_on_the_same_frames_are_equal(rendered, name):
+    runs = []
+    for _ in range(2):
+        tracker = Tracker(TrackerConfig())
+        runs.append([tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / f"{name}.mp4", count=40)])
+    assert runs[0] == runs[1]

@@ -1,0 +1,39 @@
+import pytest
+from deixis_tracker.classifier import Features, HandBelief, label
+
+
+def watched(*features):
+    belief = HandBelief()
+    for feature in features:
+        for _ in range(30):
+            belief.update(feature, 1 / 30)
+    return belief
+
+
+HANGING_RIGHT = Features(-1.4, 4.0, 0.3, 0.3, 0.9)
+HANGING_LEFT = Features(1.4, 4.0, 0.3, 0.3, 0.9)
+
+
+def test_a_hand_hanging_at_the_right_of_the_picture_is_the_persons_left():
+    assert watched(HANGING_LEFT).probabilities().left_hand > 0.9
+    assert watched(HANGING_RIGHT).probabilities().right_hand > 0.9
+
+
+def test_probabilities_sum_to_one():
+    p = watched(HANGING_LEFT).probabilities()
+    assert p.face + p.left_hand + p.right_hand + p.unknown == pytest.approx(1)
+
+
+def test_an_arm_that_crosses_the_body_keeps_its_side():
+    crossing = watched(HANGING_LEFT, Features(-1.8, 0.8, 0.1, 0.3, 1.0))
+    other = watched(HANGING_RIGHT)
+    assert label([crossing, other], ["left_hand", "right_hand"]) == ["left_hand", "right_hand"]
+
+
+def test_a_still_blob_without_foreground_is_unknown():
+    assert label([watched(Features(-1.0, 1.0, 0.0, 0.02, 0.0))], ["unknown"]) == ["unknown"]
+
+
+def test_one_person_has_each_hand_once():
+    kinds = label([watched(HANGING_LEFT), watched(HANGING_LEFT)], ["unknown", "unknown"])
+    assert sorted(kinds) != ["left_hand", "left_hand"]
