@@ -21,6 +21,8 @@ SIDE_RATE = 0.15
 KEEP_MEASURES = 15
 # The outline is worth its cost only near a stroke: hands lower than this below the face are at rest.
 LOW = 3.6
+# An arm across the body does not reach farther beyond the face, face widths.
+FARTHEST_ACROSS = 3.0
 
 
 class Arm:
@@ -63,6 +65,14 @@ class Arm:
         if not self._measures:
             return None
         return HandSight(*(statistics.median(values) for values in zip(*self._measures, strict=True)))
+
+    @property
+    def is_across(self) -> bool:
+        """The hand is on the other side of the body. A hand too far out for that has been given the wrong side."""
+        sight = self.sight
+        if sight is None or self.side is None or abs(sight.offset) > FARTHEST_ACROSS:
+            return False
+        return (sight.offset > 0) != (self.side == "left")
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""

@@ -10,6 +10,12 @@ class GestureConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
+    face_box_share: float = Field(
+        default=0.9,
+        gt=0.3,
+        le=2,
+        description="One face width (fw) of these settings, as a share of the width of the tracker's face box.",
+    )
     still_speed: float = Field(
         default=1.3, gt=0, le=20, description="A hand slower than this is still, fw/s (0.045 fw a frame at 30 frames/s)."
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from deixis_schemas.messages import Gesture, Side, Track
+from deixis_schemas.messages import Gesture, Track
 
 from .arm import Arm
 from .bearing import Bearing, estimate_bearing
@@ -60,7 +60,7 @@ class Person:
         if not seen:
             return
         x, y, w, h = max(seen, key=lambda t: (t.observed, t.confidence)).bbox_px
-        now = Face(x + w / 2, y + h / 2, w)
+        now = Face(x + w / 2, y + h / 2, w * self._config.face_box_share)
         old, passed = self._face, time_s - self._face_s
         self._face_s = time_s
         if old is None or passed <= 0 or passed > self._config.forget_s:
@@ -125,5 +125,4 @@ def _bearing(arm: Arm, distance: float) -> Bearing | None:
     sight = arm.sight
     if sight is None:
         return None
-    towards: Side = "left" if sight.offset > 0 else "right"
-    return estimate_bearing(sight, distance, across=arm.side is not None and towards != arm.side)
+    return estimate_bearing(sight, distance, across=arm.is_across)

@@ -6,6 +6,7 @@ kept, unless the recent votes say clearly otherwise.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from typing import Literal
@@ -34,8 +35,13 @@ LARGEST_AREA = 1.0
 # Without a finger: the arm is stretched sideways this far, or the hand is large since it is held toward the camera.
 STRETCHED = 1.45
 NEAR_CAMERA_PALM = 0.29
-LOWEST_BELOW_FACE = 2.2
-HIGHEST_ABOVE_FACE = 0.6
+# Without a long finger the hand is at the height of chin to belly, where an arm ends that points ahead or back: a hand beside
+# the head is rather raised to greet, and such hands have been torn to fingerless rags by a wall of skin colour.
+HEIGHTS_BELOW_FACE = (0.3, 2.2)
+# Share of the blob that the largest circle in it fills: 0.4 to 0.65 for fists, with a forearm too, below 0.3 for rags.
+COMPACT = 0.33
+# A long finger on less than this is a shred of background: fists behind long fingers have 0.21 to 0.33.
+LEAST_PALM = 0.17
 # An arm can hold its tip this far beside the face only if it is stretched sideways, which is a pointing posture whether or
 # not a finger stands out of the blob (a wall of skin colour swallows fingers, and tears others out of a fist).
 FAR_STRETCHED = 3.2
@@ -65,7 +71,7 @@ def vote(hand: HandShape, fingers: Sequence[Finger]) -> Vote:
         return "point_left" if hand.tip[0] > 0 else "point_right"
     if spread == 2:
         return "other"
-    if fingers and fingers[0].length >= POINTING_FINGER:
+    if fingers and _is_believable(fingers[0], hand):
         return _pointing(hand, fingers[0])
     return "invisible" if _is_held_out(hand) else "unclear"
 
@@ -84,11 +90,20 @@ def _is_stretched_sideways(hand: HandShape) -> bool:
     return abs(hand.tip[0]) >= FAR_STRETCHED and highest <= hand.centroid[1] <= lowest
 
 
+def _is_believable(finger: Finger, hand: HandShape) -> bool:
+    if _is_fist(hand):
+        return finger.length >= POINTING_FINGER
+    return finger.length >= LONG_FINGER and hand.palm_radius >= LEAST_PALM
+
+
 def _is_held_out(hand: HandShape) -> bool:
-    x, y = hand.centroid
-    if not -HIGHEST_ABOVE_FACE <= y <= LOWEST_BELOW_FACE:
-        return False
-    return abs(x) >= STRETCHED or hand.palm_radius >= NEAR_CAMERA_PALM
+    return _is_fist(hand) and (abs(hand.centroid[0]) >= STRETCHED or hand.palm_radius >= NEAR_CAMERA_PALM)
+
+
+def _is_fist(hand: HandShape) -> bool:
+    """A compact blob at the height of a pointing hand."""
+    highest, lowest = HEIGHTS_BELOW_FACE
+    return highest <= hand.centroid[1] <= lowest and math.pi * hand.palm_radius**2 >= COMPACT * hand.area
 
 
 def _pointing(hand: HandShape, finger: Finger) -> Vote:

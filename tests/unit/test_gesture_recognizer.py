@@ -1,0 +1,164 @@
+"""The core on drawn persons: one gesture a person, steady, deterministic, robust to bad tracks."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from deixis_gesture.config import GestureConfig
+from deixis_gesture.recognizer import GestureRecognizer
+from deixis_schemas.messages import Gestures, KindProbabilities, Producer, Track, Tracks
+from pydantic import ValidationError
+
+FACE_PX = 50.0
+UP_S, HELD_S, DOWN_S, REST_S = 1.0, 1.5, 3.0, 3.5
+POINT = (180,)
+OPEN = (-30, -60, -90, -120)
+
+
+def _track(track_id, person_id, kind, centre, size, contour=b"", **more):
+    box = (centre[0] - size[0] / 2, centre[1] - size[1] / 2, *size)
+    return Track(
+        track_id=track_id,
+        person_id=person_id,
+        kind=kind,
+        kind_probabilities=KindProbabilities(**{kind: 1.0}),
+        centroid_px=centre,
+        bbox_px=box,
+        velocity_px_s=(0.0, 0.0),
+        contour=contour,
+        **more,
+    )
+
+
+def _face(person_id=0, x=320.0):
+    width = FACE_PX / GestureConfig().face_box_share
+    return _track(10 * person_id, person_id, "face", (x, 150.0), (width, 1.2 * width))
+
+
+def _hand(place, fingers, person_id=0, x=320.0, track_id=None, kind="right_hand", **more):
+    """A hand at `place` face widths from the face, with fingers in these directions (degrees, x toward y down)."""
+    canvas = np.zeros((480, 640), np.uint8)
+    centre = np.array([x, 150.0]) + FACE_PX * np.array(place)
+    cv2.circle(canvas, [round(float(v)) for v in centre], round(0.27 * FACE_PX), 1, -1)
+    for degrees in fingers:
+        tip = centre + 0.75 * FACE_PX * np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
+        cv2.line(canvas, [round(float(v)) for v in centre], [round(float(v)) for v in tip], 1, round(0.14 * FACE_PX))
+    outlines, _ = cv2.findContours(canvas, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    contour = max(outlines, key=len)[:, 0, :].astype("<i2").tobytes() if outlines else b""
+    identity = 10 * person_id + 1 if track_id is None else track_id
+    return _track(identity, person_id, kind, (float(centre[0]), float(centre[1])), (30.0, 30.0), contour, **more)
+
+
+def _place(time_s, held=(-3.4, 1.0), rest=(-1.2, 4.3)):
+    share = min(1.0, max(0.0, (time_s - UP_S) / (HELD_S - UP_S))) - min(1.0, max(0.0, (time_s - DOWN_S) / (REST_S - DOWN_S)))
+    return rest[0] + share * (held[0] - rest[0]), rest[1] + share * (held[1] - rest[1])
+
+
+def _played(tracks_at, rate_hz=30, seconds=4.2, recognizer=None, begin_ns=10**18):
+    recognizer = recognizer or GestureRecognizer(GestureConfig())
+    times = [i / rate_hz for i in range(int(seconds * rate_hz))]
+    return [(t, recognizer.update(tracks_at(t), 640, 480, begin_ns + round(t * 1e9))) for t in times]
+
+
+def _pointing(time_s):
+    return [_face(), _hand(_place(time_s), POINT)]
+
+
+def _settled(answers):
+    return [gestures[0] for t, gestures in answers if HELD_S + 0.4 < t < DOWN_S]
+
+
+@pytest.mark.parametrize("rate_hz", [10, 15, 30])
+def test_a_pointing_is_named_with_side_hand_tip_and_bearing(rate_hz):
+    for gesture in _settled(_played(_pointing, rate_hz)):
+        assert (gesture.phase, gesture.gesture, gesture.hand) == ("stroke", "point_right", "right")
+        assert gesture.fingertips_px[0] == pytest.approx((320 - 4.15 * FACE_PX, 150 + FACE_PX), abs=6)
+        assert gesture.bearing_deg is not None
+        assert -90 < gesture.bearing_deg < -30
+
+
+def test_before_and_after_the_stroke_nothing_is_pointed_at():
+    outside = [gestures[0] for t, gestures in _played(_pointing) if t < HELD_S - 0.1 or t > DOWN_S + 0.2]
+    assert {gesture.gesture for gesture in outside} == {"none"}
+    assert _played(_pointing)[-1][1][0].phase == "idle"
+
+
+def test_an_open_hand_is_other():
+    answers = _played(lambda t: [_face(), _hand(_place(t, held=(-1.8, 0.2)), OPEN)])
+    assert {g.gesture for g in _settled(answers)} == {"other"}
+    assert all(g.bearing_deg is None for g in _settled(answers))
+
+
+def test_a_fist_held_toward_the_camera_is_invisible():
+    assert {g.gesture for g in _settled(_played(lambda t: [_face(), _hand(_place(t, held=(-1.9, 0.9)), ())]))} == {"invisible"}
+
+
+def test_a_fist_that_was_there_when_the_person_came_is_no_pointing():
+    gestures = [answers[0].gesture for _, answers in _played(lambda _: [_face(), _hand((-1.9, 0.9), ())])]
+    assert set(gestures) <= {"none", "other"}
+
+
+def test_two_runs_on_the_same_tracks_are_equal():
+    assert _played(_pointing) == _played(_pointing)
+
+
+def test_a_hand_missed_now_and_then_and_renamed_stays_in_its_stroke():
+    def patchy(time_s):
+        step = round(time_s * 30)
+        hand = _hand(_place(time_s), POINT, track_id=1 if time_s < 2.2 else 7)
+        return [_face()] if step % 5 in (1, 2) else [_face(), hand]
+
+    assert {(g.phase, g.gesture) for g in _settled(_played(patchy))} == {("stroke", "point_right")}
+
+
+def test_a_hand_lost_for_good_ends_its_stroke():
+    answers = _played(lambda t: _pointing(t) if t < 2.2 else [_face()])
+    assert answers[-1][1][0].phase == "idle"
+
+
+def test_predicted_and_empty_hands_say_nothing():
+    answers = _played(lambda t: [_face(), _track(1, 0, "right_hand", (150.0, 200.0), (30.0, 30.0), observed=t < 1)])
+    assert {g[0].phase for _, g in answers} == {"idle"}
+
+
+def test_every_person_with_a_face_has_one_gesture_and_nobody_else():
+    def two(time_s):
+        own = [_face(0, 200.0), _hand((-1.2, 4.3), (), x=200.0), _face(1, 450.0)]
+        loose = _hand(_place(time_s), POINT, person_id=5, x=450.0)
+        pointing = _hand(_place(time_s, held=(3.2, 1.0), rest=(1.2, 4.3)), (0,), 1, 450.0, kind="left_hand")
+        return [*own, pointing, loose, loose.model_copy(update={"person_id": None, "track_id": 99})]
+
+    for time_s, gestures in _played(two):
+        assert [g.person_id for g in gestures] == [0, 1]
+        if HELD_S + 0.4 < time_s < DOWN_S:
+            assert [g.gesture for g in gestures] == ["none", "point_left"]
+
+
+def test_time_that_runs_back_starts_anew():
+    recognizer = GestureRecognizer(GestureConfig())
+    first = _played(_pointing, recognizer=recognizer)
+    assert _played(_pointing, recognizer=recognizer, begin_ns=10**17) != []
+    again = GestureRecognizer(GestureConfig())
+    assert first == _played(_pointing, recognizer=again)
+
+
+def test_a_face_too_small_to_measure_by_gives_no_gesture():
+    tiny = _track(0, 0, "face", (320.0, 150.0), (2.0, 2.0))
+    assert GestureRecognizer(GestureConfig()).update([tiny], 640, 480, 1) == []
+
+
+def test_an_empty_frame_is_refused_by_name():
+    with pytest.raises(ValueError, match="width, height: 0 x 480"):
+        GestureRecognizer(GestureConfig()).update([], 0, 480, 1)
+
+
+def test_an_unknown_setting_is_refused():
+    with pytest.raises(ValidationError, match="stil_speed"):
+        GestureConfig.model_validate({"stil_speed": 1})
+
+
+def test_answers_fit_the_message():
+    tracks = Tracks(seq=3, stamp_ns=10**18, stage="tracker", instance="t", width=640, height=480, tracks=_pointing(2.0))
+    gestures = GestureRecognizer(GestureConfig()).update(tracks.tracks, tracks.width, tracks.height, tracks.stamp_ns)
+    assert Gestures.derive(tracks, Producer("gesture", "g"), gestures=gestures).frame_id == tracks.frame_id
