@@ -7,7 +7,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from deixis_schemas.messages import Belief, Frame, Gesture, Gestures, HeadPose, HeadPoses, Message, Target, Track, Tracks
+from deixis_schemas.messages import (
+    Belief,
+    Frame,
+    Gesture,
+    Gestures,
+    Health,
+    HeadPose,
+    HeadPoses,
+    Message,
+    Target,
+    Track,
+    Tracks,
+)
 from pydantic import ValidationError
 
 
@@ -20,6 +32,7 @@ class Recording:
     """Messages by the `seq` of their frame, which is the frame's index in the clip.
 
     frame_ns, belief_ns: when frame and belief were received, Unix ns. stamps_ns: the frames' own stamps. targets: final ones.
+    pids: processes that each stage has had.
     """
 
     frame_ns: dict[int, int] = field(default_factory=dict)
@@ -30,6 +43,7 @@ class Recording:
     gestures: dict[int, Gestures] = field(default_factory=dict)
     beliefs: dict[int, Belief] = field(default_factory=dict)
     targets: list[Target] = field(default_factory=list)
+    pids: dict[str, set[int]] = field(default_factory=dict)
 
     def add(self, message: Message, received_ns: int) -> None:
         """Sort in one message; of no interest are those that speak of no frame, and updates of targets."""
@@ -45,6 +59,13 @@ class Recording:
             self.stamps_ns[message.seq] = message.stamp_ns
         elif isinstance(message, Target) and message.final:
             self.targets.append(message)
+        elif isinstance(message, Health):
+            self.pids.setdefault(message.stage, set()).add(message.pid)
+
+    @property
+    def restarted(self) -> list[str]:
+        """Stages that ended and were started again."""
+        return sorted(stage for stage, pids in self.pids.items() if len(pids) > 1)
 
     def add_frame(self, seq: int, stamp_ns: int, received_ns: int) -> None:
         """Note that a frame was published."""
@@ -74,7 +95,7 @@ class Recording:
         return first + (last - first) * (stamp_ns - first_ns) / (last_ns - first_ns) if last_ns > first_ns else float(first)
 
 
-SCORED: dict[str, type[Message]] = {cls.__name__: cls for cls in (Tracks, HeadPoses, Gestures, Belief, Target)}
+SCORED: dict[str, type[Message]] = {cls.__name__: cls for cls in (Tracks, HeadPoses, Gestures, Belief, Target, Health)}
 
 
 def read_recording(path: Path) -> Recording:

@@ -280,13 +280,18 @@ def test_a_recording_is_read_back_from_its_lines(tmp_path: Path) -> None:
         entry = {"key": "k", "type": type(message).__name__, "received_ns": 5, "message": json.loads(message.model_dump_json())}
         lines.append(json.dumps(entry))
     lines.append(json.dumps({"key": "k", "type": "Frame", "seq": 4, "stamp_ns": 8, "received_ns": 9, "message": {}}))
-    lines.append(json.dumps({"key": "k", "type": "Health", "received_ns": 9, "message": {"of": "no interest"}}))
+    lines.append(json.dumps({"key": "k", "type": "CameraInfo", "received_ns": 9, "message": {"of": "no interest"}}))
+    for stage, pid in (("fusion", 5), ("tracker", 6), ("fusion", 7)):
+        beat = {"stamp_ns": 1, "stage": stage, "instance": "t", "count": 1, "state": "ok", "pid": pid, "host": "h"}
+        beat |= {"uptime_s": 1, "cpu_s": 1, "rss_mb": 1}
+        lines.append(json.dumps({"key": "k", "type": "Health", "received_ns": 9, "message": beat}))
     path = tmp_path / "a.jsonl"
     path.write_text("\n".join(lines))
     read = read_recording(path)
     assert read.tracks[4] == shown
     assert [item.poi_ids for item in read.targets] == [["P1"]]
     assert read.frame_ns == {4: 9}
+    assert read.restarted == ["fusion"]
 
 
 @pytest.mark.parametrize(
@@ -294,6 +299,6 @@ def test_a_recording_is_read_back_from_its_lines(tmp_path: Path) -> None:
 )
 def test_a_damaged_recording_names_file_and_line(tmp_path: Path, line: str) -> None:
     path = tmp_path / "a.jsonl"
-    path.write_text('{"type": "Health"}\n' + line)
+    path.write_text('{"type": "CameraInfo"}\n' + line)
     with pytest.raises(RecordingError, match=r"a\.jsonl' line 2"):
         read_recording(path)
