@@ -69,6 +69,11 @@ class Person:
         w = self.width
         return around(self.x, self.y, 2.1 * w, 1.2 * w, 2.1 * w, 8.5 * w)
 
+    def resting_hands_box(self) -> Box:
+        """Where hands hang. Above it a hand is raised, and has come there since the room was learned."""
+        w = self.width
+        return Box(self.x - 2.1 * w, self.y + 2.4 * w, 4.2 * w, 3.8 * w)
+
     def shoulder(self, x: float) -> tuple[float, float]:
         """The shoulder on the side of the picture where `x` is."""
         side = 1.0 if x > self.x else -1.0

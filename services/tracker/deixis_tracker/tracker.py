@@ -196,7 +196,7 @@ class Tracker:
         self._learn_skin(person, work)
         rows, columns = person.face_box().window(*changed.shape)
         if changed[rows, columns].mean() < 0.5 * 255:  # was here when the room was learned
-            self._background.mark_unknown(person.body_box())
+            self._background.mark_unknown(person.resting_hands_box())
 
     # --- hands --------------------------------------------------------------------------------------------------------
 
