@@ -86,6 +86,14 @@ def test_a_brief_drop_out_does_not_split_an_episode_and_a_long_one_does() -> Non
     assert len(follow([(20, gesture()), (12, REST), (20, gesture())])) == 2
 
 
+def test_a_hand_held_on_stays_in_its_episode_while_its_outline_tells_nothing() -> None:
+    unclear = gesture("none", "stroke")
+    (stroke,) = follow([(20, gesture()), (20, unclear), (20, gesture())])
+    assert len(stroke.samples) == 40
+    assert len(follow([(20, gesture()), (40, unclear), (20, gesture())])) == 2
+    assert follow([(90, unclear)]) == []
+
+
 def test_a_stroke_that_is_mostly_an_open_hand_is_no_episode() -> None:
     assert follow([(4, gesture("other")), (1, gesture())] * 10) == []
 

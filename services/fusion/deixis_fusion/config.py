@@ -74,6 +74,7 @@ class FusionConfig(BaseModel):
     min_stroke_s: float = Field(default=0.25, ge=0, le=10, description="Strokes shorter than this are no pointing.")
     max_gap_s: float = Field(default=0.3, ge=0, le=10, description="A stroke that drops out for less goes on.")
     settle_s: float = Field(default=0.2, ge=0, le=10, description="At first the head may still turn: less weight.")
+    max_unclear_s: float = Field(default=1.0, ge=0, le=10, description="A hand held on may be unclear for so long.")
     swing_s: float = Field(
         default=0.4, ge=0, le=10, description="A hand that points to the other side for so long starts anew."
     )

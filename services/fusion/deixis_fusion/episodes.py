@@ -19,6 +19,7 @@ class Stroke:
 
     started_ns: int
     last_pointing_ns: int
+    last_held_ns: int
     episode_id: str = ""
     samples: list[Sample] = field(default_factory=list)
     not_pointing: int = 0
@@ -48,6 +49,9 @@ class EpisodeTracker:
     def observe(self, sample: Sample) -> Stroke | None:
         """Take in the next frame. Returns the episode that it ended, for its final answer."""
         ended = self._end_after_gap(sample.stamp_ns) or self._end_after_turn(sample)
+        if sample.unclear and self.stroke is not None:
+            # A hand still held up whose outline tells nothing for a while is the same gesture.
+            self.stroke.last_held_ns = sample.stamp_ns
         if sample.pointing:
             self._extend(sample)
         elif sample.not_pointing and self.stroke is not None:
@@ -62,9 +66,11 @@ class EpisodeTracker:
         return episode
 
     def _end_after_gap(self, stamp_ns: int) -> Stroke | None:
-        if self.stroke is None or stamp_ns - self.stroke.last_pointing_ns <= self._config.max_gap_s * 1e9:
+        if self.stroke is None:
             return None
-        return self.finish()
+        gone = stamp_ns - self.stroke.last_held_ns > self._config.max_gap_s * 1e9
+        unclear = stamp_ns - self.stroke.last_pointing_ns > self._config.max_unclear_s * 1e9
+        return self.finish() if gone or unclear else None
 
     def _end_after_turn(self, sample: Sample) -> Stroke | None:
         """A hand that swings over to the other side and stays there begins another episode, without a retraction between."""
@@ -87,8 +93,8 @@ class EpisodeTracker:
 
     def _extend(self, sample: Sample) -> None:
         if self.stroke is None:
-            self.stroke = Stroke(sample.stamp_ns, sample.stamp_ns)
-        self.stroke.last_pointing_ns = sample.stamp_ns
+            self.stroke = Stroke(sample.stamp_ns, sample.stamp_ns, sample.stamp_ns)
+        self.stroke.last_pointing_ns = self.stroke.last_held_ns = sample.stamp_ns
         self.stroke.samples.append(sample)
         self.stroke.sides[sample.pointing or ""] += 1
         oldest_ns = sample.stamp_ns - self._config.max_evidence_s * 1e9

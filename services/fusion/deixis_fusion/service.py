@@ -84,11 +84,13 @@ class FusionService:
     # --- inputs -------------------------------------------------------------------------------------------------------
 
     def _take_edits(self) -> None:
-        for edit in self._poi_edits.take_all():
+        edits = self._poi_edits.take_all()
+        for edit in edits:
             refused = self._edits.take(edit, self._node.now_ns())
             if refused is not None:
-                self._node.warn(f"edit {edit.key}", f"{edit.key}: edit refused: {refused}")
-        self._after_edits()
+                self._node.warn("edit", f"{edit.key}: edit refused: {refused}")
+        if edits:
+            self._after_edits()
 
     def _after_edits(self) -> None:
         self._fusion.set_pois(self._registry.pois())

@@ -44,6 +44,11 @@ class Sample:
         return next((kind for kind in POINTING if kind == self.gesture.gesture), None)
 
     @property
+    def unclear(self) -> bool:
+        """A stroke whose gesture could not be told."""
+        return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "none"
+
+    @property
     def not_pointing(self) -> bool:
         """A stroke of an open hand, a wave and the like."""
         return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
