@@ -126,22 +126,27 @@ def camera_state(camera: CameraInfo | None) -> Iterator[Finding]:
 
 
 def rates(system: System) -> Iterator[Finding]:
-    """Stages that keep up with the camera, by the topic table."""
+    """Stages that keep up with what they are given, by the topic table: the slow one is named, not all behind it."""
     camera = system.camera
     if camera is None or camera.state != "streaming" or camera.lockstep:
         return
     for topic in topics.TOPICS:
         if topic.by is not By.FRAME or topic.rate_hz is None:
             continue
-        # The table names the rate of an ordinary camera; this one may be slower or faster.
-        expected_hz = camera.rate_hz or topic.rate_hz
-        for process in _settled(system, topic.path.split("/")[0]):
-            rate_hz = next((item.rate_hz for item in process.outputs if item.key.endswith("/" + topic.path)), 0.0)
+        for health in _settled(system, topic.path.split("/")[0]):
+            # The table names the rate of an ordinary camera; this one may be slower or faster.
+            expected_hz = min([camera.rate_hz or topic.rate_hz, *_given_hz(health)])
+            rate_hz = next((item.rate_hz for item in health.outputs if item.key.endswith("/" + topic.path)), 0.0)
             if rate_hz < SLOW_SHARE * expected_hz:
-                advice = (
-                    f"its step takes {process.step_ms_p50:.0f} ms; lower the camera's rate_hz or size, or free the processor"
-                )
+                step = f"its step takes {health.step_ms_p50:.0f} ms"
+                advice = f"{step}; lower the camera's rate_hz or size, or free the processor"
                 yield Finding("wrong", f"{topic.path}: {rate_hz:.1f}/s, expected {expected_hz:.0f}/s", advice)
+
+
+def _given_hz(health: Health) -> list[float]:
+    """Rates of the inputs that come with each frame."""
+    per_frame = {topic.path for topic in topics.TOPICS if topic.by is By.FRAME}
+    return [item.rate_hz for item in health.inputs if "/".join(item.key.split("/")[2:]) in per_frame]
 
 
 def inputs(system: System) -> Iterator[Finding]:

@@ -108,3 +108,13 @@ def test_rates_are_not_judged_in_lockstep_or_when_the_camera_has_ended():
     assert wrong(system(processes=slow, camera=camera(lockstep=True))) == []
     assert wrong(system(processes=slow, camera=camera(state="ended", reason="played to its end"))) == []
     assert wrong(system(processes=slow)) == ["tracker/tracks: 0.0/s, expected 30/s"]
+
+
+def test_a_slow_stage_is_blamed_and_not_those_behind_it():
+    def at(stage, rate_hz, **inputs):
+        outputs = [OutputHealth(key=f"deixis/r1/{path}", rate_hz=rate_hz) for path in ("tracker/tracks", "gesture/gestures")]
+        heard = [InputHealth(key=f"deixis/r1/{path.replace('_', '/')}", rate_hz=hz, age_s=0.1) for path, hz in inputs.items()]
+        return [process(stage, outputs=outputs, inputs=heard, step_ms_p50=99)]
+
+    slow = {"tracker": at("tracker", 9, camera_frame=30), "gesture": at("gesture", 9, tracker_tracks=9.5)}
+    assert wrong(system(processes=slow)) == ["tracker/tracks: 9.0/s, expected 30/s"]
