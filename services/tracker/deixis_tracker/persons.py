@@ -47,6 +47,7 @@ class Person:
     observed: bool = True
     frontal: bool = True
     frontal_hits: int = 1
+    skin_centre: tuple[float, float] | None = None
     hands: list[HandTrack] = field(default_factory=list)
 
     @property

@@ -22,6 +22,7 @@ from deixis_tracker.hypotheses import at_pixels, propagate, sample_pixels, suppo
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import MOST_HANDS, HandTrack, Person
 from deixis_tracker.segmentation import Blob, MotionHistory, hand_blobs
+from deixis_tracker.silhouettes import find_heads
 from deixis_tracker.skin import SkinModel
 
 Image = NDArray[np.uint8]
@@ -36,6 +37,8 @@ LOOK_AGAIN_EVERY = 5  # frames
 ADAPT_SKIN_EVERY = 15
 ADAPT_ROOM_EVERY = 45
 LEAST_EVIDENCE = 0.25
+LEAST_FRAMES = 3
+WALKER_HITS = 5
 LONGEST_STEP_S = 0.5
 
 
@@ -79,6 +82,7 @@ class Tracker:
         self._detector = FaceDetector(height, width, self._config)
         self._finder = HeadFinder()
         self._persons: list[Person] = []
+        self._walkers: list[Candidate] = []
         self._frozen: Mask = np.zeros((height, width), np.uint8)
         self._stamp_ns = stamp_ns
         self._frame = 0
@@ -91,6 +95,7 @@ class Tracker:
         self._motion.update(work)
         for person in self._persons:
             self._follow_head(person, work, grey, now_ns, dt_s)
+            person.skin_centre = self._centre_of_skin(person, skin)
         self._drop_lost(now_ns)
         self._find_new_faces(work, grey, skin, changed, now_ns)
         if self._persons:
@@ -149,6 +154,14 @@ class Tracker:
         w = person.width
         return any(abs(h.motion.x - person.x) < 1.4 * w and h.motion.y - person.y < 3.8 * w for h in person.hands)
 
+    def _centre_of_skin(self, person: Person, skin: Image) -> tuple[float, float] | None:
+        """Centroid of the skin on the head: where the face is on a head that is turned."""
+        rows, columns = person.face_box().window(*skin.shape)
+        moments = cv2.moments(cv2.inRange(skin[rows, columns], self._config.skin_high, 255), binaryImage=True)
+        if moments["m00"] < 0.08 * person.width**2:
+            return None
+        return columns.start + moments["m10"] / moments["m00"], rows.start + moments["m01"] / moments["m00"]
+
     def _hand_before(self, person: Person) -> bool:
         w = person.width
         return any(
@@ -176,6 +189,22 @@ class Tracker:
         for candidate in self._detector.confirmed(grey, skin):
             if len(self._persons) < self._config.max_persons and not self._is_known(candidate):
                 self._add_person(candidate, work, changed, now_ns)
+                self._learn_skin(self._persons[-1], work)
+        self._find_walkers(work, skin, changed, now_ns)
+
+    def _find_walkers(self, work: Image, skin: Image, changed: Mask, now_ns: int) -> None:
+        """Believe the head of a silhouette that was seen in some frames in a row, each near the last."""
+        heads = [] if self._background.unstable else find_heads(changed, skin, self._frozen)
+        walkers = []
+        for head in heads:
+            before = [w for w in self._walkers if abs(w.x - head.x) < 0.6 * head.width and abs(w.y - head.y) < 0.5 * head.width]
+            hits = 1 + max((w.hits for w in before), default=0)
+            walkers.append(Candidate(head.x, head.y, head.width / WIDTH_OF_HAAR, hits))
+        self._walkers = walkers
+        for walker in walkers:
+            if walker.hits >= WALKER_HITS and len(self._persons) < self._config.max_persons and not self._is_known(walker):
+                walker.y -= HEAD_CENTRE_BELOW_HAAR * walker.width
+                self._add_person(walker, work, changed, now_ns)
 
     def _is_known(self, candidate: Candidate) -> bool:
         """A face cannot be where a tracked head or the body below it is."""
@@ -193,7 +222,6 @@ class Tracker:
         self._ids += 1
         person.colours.learn(work, person.x, person.y, width, 1.0)
         self._persons.append(person)
-        self._learn_skin(person, work)
         rows, columns = person.face_box().window(*changed.shape)
         if changed[rows, columns].mean() < 0.5 * 255:  # was here when the room was learned
             self._background.mark_unknown(person.resting_hands_box())
@@ -218,6 +246,7 @@ class Tracker:
             for _, h in tracks
         ]
         taken: set[int] = set()
+        unclaimed: list[Blob] = []
         for blob in blobs:
             claims = [
                 k for k in range(len(tracks)) if k not in taken and support(densities[k], blob.mask, blob.x0, blob.y0) > 0.15
@@ -227,7 +256,9 @@ class Tracker:
                 if self._observe(person, hand, part, now_ns, dt_s):
                     taken |= {k for k in claims if tracks[k][1] is hand}
             if not claims:
-                self._new_hand(blob, now_ns)
+                unclaimed.append(blob)
+        for blob in unclaimed:
+            self._new_hand(blob, now_ns)
         for person in self._persons:
             self._settle_hands(person, now_ns)
 
@@ -255,7 +286,9 @@ class Tracker:
 
     def _observe(self, person: Person, track: HandTrack, blob: Blob, now_ns: int, dt_s: float) -> bool:
         side = {"left_hand": 1.0, "right_hand": -1.0, "unknown": track.motion.x - person.x}[track.kind]
-        hand = self._cut(person, blob, (track.motion.x, track.motion.y), person.x + side)
+        # Only a raised forearm can have its hand at the end near the shoulder.
+        raised = track.motion.y < person.y + 2.4 * person.width
+        hand = self._cut(person, blob, (track.motion.x, track.motion.y) if raised else None, person.x + side)
         if hand is None:
             return False
         track.motion.correct(*hand.centroid, 0.06 * person.width)
@@ -287,6 +320,9 @@ class Tracker:
         track = HandTrack(self._ids, motion, sample_pixels(hand.mask, hand.x0, hand.y0), hand, now_ns, belief=HandBelief())
         self._ids += 1
         track.evidence = blob.evidence
+        for lost in person.hands:  # a hand that jumped, e.g. blurred, is likelier the one just lost than the one in view
+            if lost.blob is None and lost.kind != "unknown":
+                track.belief.favour(lost.kind)
         track.belief.update(self._features(person, track, blob.evidence), 1.0)
         person.hands.append(track)
 
@@ -301,9 +337,11 @@ class Tracker:
             inside = 0 <= hand.motion.x < width and 0 <= hand.motion.y < height
             if near and inside and now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9:
                 kept.append(hand)
-        person.hands = kept
-        for hand, kind in zip(kept, label([h.belief for h in kept], [h.kind for h in kept]), strict=True):
+        seen = [hand for hand in kept if hand.blob is not None]
+        for hand, kind in zip(seen, label([h.belief for h in seen], [h.kind for h in seen]), strict=True):
             hand.kind = kind
+        shown = {hand.kind for hand in seen if _is_shown(hand)}
+        person.hands = [hand for hand in kept if hand.blob is not None or hand.kind not in shown]
 
     def _people_mask(self, height: int, width: int) -> Mask:
         mask = np.zeros((height, width), np.uint8)
@@ -319,8 +357,8 @@ class Tracker:
     # --- output -------------------------------------------------------------------------------------------------------
 
     def _tracks(self, person: Person, scale: float) -> list[Track]:
-        shown = [h for h in person.hands if h.kind != "unknown" and h.evidence >= LEAST_EVIDENCE and h.frames >= 3]
-        return [self._face_track(person, scale), *(self._hand_track(person, hand, scale) for hand in shown)]
+        hands = [self._hand_track(person, hand, scale) for hand in person.hands if _is_shown(hand)]
+        return [self._face_track(person, scale), *hands]
 
     def _face_track(self, person: Person, scale: float) -> Track:
         box = person.face_box()
@@ -330,7 +368,7 @@ class Tracker:
             person_id=person.person_id,
             kind="face",
             kind_probabilities=KindProbabilities(face=trust, unknown=1 - trust),
-            centroid_px=_to_frame(*box.centre, scale),
+            centroid_px=_to_frame(*(person.skin_centre or box.centre), scale),
             bbox_px=(*_to_frame(box.x, box.y, scale), box.w * scale, box.h * scale),
             velocity_px_s=(person.motion.vx * scale, person.motion.vy * scale),
             observed=person.observed,
@@ -355,6 +393,10 @@ class Tracker:
             observed=hand.blob is not None,
             confidence=float(getattr(probabilities, hand.kind)),
         )
+
+
+def _is_shown(hand: HandTrack) -> bool:
+    return hand.kind != "unknown" and hand.evidence >= LEAST_EVIDENCE and hand.frames >= LEAST_FRAMES
 
 
 def _to_frame(x: float, y: float, scale: float) -> tuple[float, float]:
