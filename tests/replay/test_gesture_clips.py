@@ -68,7 +68,7 @@ def _gestures(folder, name, every):
 def test_a_pointing_is_recognised_through_its_stroke(rendered, name, expected, hand, every):
     answers = _gestures(rendered, name, every)
     stroke = [gesture for truth, gesture in answers if truth["phase"] == "stroke"]
-    settled = stroke[9 // every + 1 :]
+    settled = stroke[13 // every + 1 :]
     assert {(g.phase, g.gesture, g.hand) for g in settled} == {("stroke", expected, hand)}
     apart = [truth["phase"] for truth, g in answers if g.gesture in POINTING and truth["phase"] not in ("stroke", "retraction")]
     assert apart == []

@@ -32,7 +32,7 @@ class GestureConfig(BaseModel):
     beside_body: float = Field(
         default=2.3, ge=0, le=6, description="Sideways from the face's centre, a hand is off the body, fw."
     )
-    settle_s: float = Field(default=0.2, ge=0, le=2, description="A stroke lasts this long before its gesture is said.")
+    settle_s: float = Field(default=0.3, ge=0, le=2, description="A stroke lasts this long before its gesture is said.")
     forget_s: float = Field(default=0.4, gt=0, le=5, description="A hand or a face unseen for longer is forgotten.")
     walking_speed: float = Field(default=2.0, gt=0, le=40, description="A person whose face is faster than this walks, fw/s.")
     focal_length_widths: float = Field(
