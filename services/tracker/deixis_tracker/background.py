@@ -20,6 +20,7 @@ Mask = NDArray[np.uint8]
 UPDATE_EVERY = 3  # frames
 GRID = 8  # the gain is fitted on every 8th pixel
 UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, changed
+SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07
 SHADOW_DARKEST = 0.35
 
@@ -44,7 +45,7 @@ class Background:
 
     def changed(self, image: Image, frozen: Mask) -> Mask:
         """(H, W) uint8, 255 where the picture differs from the room under today's light. `frozen`: 255 where people are."""
-        self._expected = np.asarray(cv2.LUT(self._shown, self._gain_table(image, frozen)), np.uint8)
+        self._expected = self._under_light(image, frozen)
         difference = cv2.absdiff(image, self._expected)
         b, g, r = cv2.split(difference)
         largest = cv2.max(cv2.max(b, g), r)
@@ -84,15 +85,18 @@ class Background:
         cv2.accumulateWeighted(image, self._mean, rate, mask=where)
         self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
-    def _gain_table(self, image: Image, frozen: Mask) -> NDArray[np.uint8]:
-        """One gain per channel, the median ratio over the room, as a table for cv2.LUT."""
+    def _under_light(self, image: Image, frozen: Mask) -> Image:
+        """The room under today's light: one gain per channel, the median ratio over the room."""
         grid = np.s_[GRID // 2 :: GRID, GRID // 2 :: GRID]
         free = frozen[grid] == 0
-        table = np.empty((1, 256, 3), np.uint8)
-        levels = np.arange(256, dtype=np.float32)
+        seen = image[grid][free].astype(np.float32)
+        room = self._shown[grid][free].astype(np.float32)
+        gains = []
         for c in range(3):
-            seen, room = image[..., c][grid][free].astype(np.float32), self._shown[..., c][grid][free].astype(np.float32)
-            usable = (room > 20) & (room < 245) & (seen < 245)
-            gain = float(np.median(seen[usable] / room[usable])) if usable.sum() >= 20 else 1.0
-            table[0, :, c] = np.clip(levels * gain, 0, 255)
-        return table
+            usable = (room[:, c] > 20) & (room[:, c] < 245) & (seen[:, c] < 245)
+            gains.append(float(np.median(seen[usable, c] / room[usable, c])) if usable.sum() >= 20 else 1.0)
+        if max(abs(gain - 1) for gain in gains) < SAME_LIGHT:
+            return self._shown
+        levels = np.arange(256, dtype=np.float32)[:, None] * np.array(gains, np.float32)
+        table = np.clip(levels, 0, 255).astype(np.uint8)[None]
+        return np.asarray(cv2.LUT(self._shown, table), np.uint8)

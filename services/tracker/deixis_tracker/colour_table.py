@@ -20,4 +20,4 @@ def look_up(table: Image, image: Image) -> Image:
     for channel in (1, 2):
         index <<= bits
         index |= image[..., channel] >> (8 - bits)
-    return np.asarray(table.ravel()[index], np.uint8)
+    return np.asarray(np.take(table.ravel(), index, mode="clip"), np.uint8)

@@ -78,7 +78,7 @@ class HeadColours:
 
     def map(self, part: Image) -> Map:
         """P(head) of each pixel, 0 to 1."""
-        return np.asarray(look_up(self._table, part), np.float32) / 255
+        return np.asarray(look_up(self._table, part) * np.float32(1 / 255), np.float32)
 
 
 def _histogram(part: Image, mask: Image) -> Map:

@@ -1,7 +1,7 @@
 """Heads of people who walk past in profile, where no frontal face is seen: the top of a moving, upright silhouette.
 
-Somebody who comes into an empty room differs from it from head to foot, so the head is the top of the changed region; skin in it
-tells a person from a door that opens.
+Somebody who comes into an empty room differs from it from head to foot, so the head is the top of the changed region; skin
+in it tells a person from a door that opens.
 """
 
 from __future__ import annotations
