@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from deixis_headpose.head import Camera, Pose, ellipsoid, facing_camera, project, rotation_of
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 CAMERA = Camera(560.0, 319.5, 239.5)
@@ -28,6 +28,7 @@ def test_yaw_is_relative_to_the_line_from_head_to_camera() -> None:
     assert Pose(np.eye(3), aside).angles_deg()[0] == pytest.approx(np.degrees(np.arctan2(0.5, 2.0)))
 
 
+@settings(max_examples=20)
 @given(turn=st.tuples(angle, angle, angle))
 def test_the_jacobian_is_the_derivative_of_the_projection(turn: tuple[float, float, float]) -> None:
     pose = Pose(rotation_of(*np.radians(turn)), np.array([0.3, -0.2, 1.8]))
@@ -40,6 +41,7 @@ def test_the_jacobian_is_the_derivative_of_the_projection(turn: tuple[float, flo
         assert np.allclose((ahead - behind) / 2e-5, jacobian[:, :, k], atol=0.05, rtol=1e-3)
 
 
+@settings(max_examples=20)
 @given(a=st.tuples(angle, angle, angle), b=st.tuples(angle, angle, angle))
 def test_a_step_between_two_poses_leads_from_one_to_the_other(
     a: tuple[float, float, float], b: tuple[float, float, float]

@@ -32,7 +32,7 @@ def levels_of(picture: np.ndarray) -> list[Level]:
 
 @pytest.fixture(scope="module")
 def keyframe() -> Keyframe:
-    return take_keyframe(levels_of(painted_head(START)), SURFACE, START, CAMERA, 1.0)
+    return take_keyframe(levels_of(painted_head(START)), SURFACE, START, CAMERA)
 
 
 @pytest.mark.parametrize("yaw", [-12.0, 5.0, 12.0])

@@ -32,13 +32,14 @@ class HeadposeConfig(BaseModel):
     keyframe_spacing_deg: float = Field(default=14.0, gt=1, le=45, description="A new keyframe where none is this near.")
     keyframe_limit: int = Field(default=60, ge=1, le=500, description="Keyframes of one head at most.")
     gate: float = Field(default=0.75, gt=0, lt=1, description="Unweighted correlation below which a match is not believed.")
-    search_gate: float = Field(
-        default=0.90, gt=0, lt=1, description="Correlation below which other starts are tried as well."
-    )
+    search_gate: float = Field(default=0.90, gt=0, lt=1, description="Correlation below which other starts are tried as well.")
     keyframe_gate: float = Field(default=0.82, gt=0, lt=1, description="Correlation needed to take a keyframe.")
 
     range_deg: float = Field(default=100.0, gt=30, le=150, description="Yaw beyond which the head is out of range, degrees.")
     turned_deg: float = Field(default=45.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
+    doubt_deg: float = Field(
+        default=60.0, gt=20, le=120, description="Beyond this yaw, and where lost, a frontal face that is seen starts it anew."
+    )
     hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 

@@ -18,17 +18,16 @@ from .patch import Level
 
 @dataclass(frozen=True)
 class Keyframe:
-    """One view: pose, a template per pyramid level, and the sigma of its yaw (degrees) from the chain it hangs on."""
+    """One view: the pose and a template per pyramid level."""
 
     pose: Pose
     templates: tuple[Template, ...]
-    yaw_sigma_deg: float
 
 
-def take_keyframe(levels: Sequence[Level], surface: Surface, pose: Pose, camera: Camera, yaw_sigma_deg: float) -> Keyframe:
+def take_keyframe(levels: Sequence[Level], surface: Surface, pose: Pose, camera: Camera) -> Keyframe:
     """Read the head's texture from a picture at a known pose."""
     seen = [observe(level, surface, pose, camera) for level in levels]
-    return Keyframe(pose, tuple(Template(o.values, o.weights) for o in seen), yaw_sigma_deg)
+    return Keyframe(pose, tuple(Template(o.values, o.weights) for o in seen))
 
 
 @dataclass

@@ -12,7 +12,7 @@ from .head import Array, Pose
 from .lsm import Prior
 
 LEVER_M = 0.032
-"""How far before the axis that it turns about the head's centre lies; 0.03 for the neck alone, more where the torso joins in."""
+"""How far before the axis that it turns about the head's centre lies; 0.03 for the neck alone, more with the torso."""
 SIGMA_M = np.array([0.015, 0.02, 0.004])
 """How well the neck's place is known: across, up, along the line of sight."""
 TURN_SIGMA = np.radians([25.0, 60.0, 25.0])

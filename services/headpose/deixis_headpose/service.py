@@ -28,19 +28,17 @@ def serve(node: Node, config: HeadposeConfig) -> None:
         if pair is None:
             continue
         with node.step():
-            poses = _poses(node, estimator, *pair)
-        if poses is not None:
-            out.put(poses)
+            out.put(_poses(node, estimator, *pair))
 
 
-def _poses(node: Node, estimator: HeadPoseEstimator, frame: Frame, tracks: Tracks) -> HeadPoses | None:
-    """The heads of a frame; none where its picture cannot be used, which is counted and said."""
+def _poses(node: Node, estimator: HeadPoseEstimator, frame: Frame, tracks: Tracks) -> HeadPoses:
+    """The heads of a frame; none where its picture cannot be used, which is counted and said (fusion waits for an answer)."""
     try:
         image = decode_image(frame)
     except ImageError as error:
         node.count("frames_unreadable")
         node.warn("unreadable frame", f"frame {frame.seq} of {frame.stage}/{frame.instance}: {error}")
-        return None
+        return HeadPoses.derive(frame, node.producer, poses=[])
     if (tracks.width, tracks.height) != (frame.width, frame.height):
         node.count("tracks_of_other_size")
         node.warn(
@@ -48,7 +46,7 @@ def _poses(node: Node, estimator: HeadPoseEstimator, frame: Frame, tracks: Track
             f"tracks of {tracks.stage}/{tracks.instance} speak of {tracks.width} x {tracks.height}, "
             f"frame {frame.seq} is {frame.width} x {frame.height}",
         )
-        return None
+        return HeadPoses.derive(frame, node.producer, poses=[])
     poses = estimator.update(image, tracks.tracks, frame.stamp_ns)
     return HeadPoses.derive(frame, node.producer, poses=poses)
 

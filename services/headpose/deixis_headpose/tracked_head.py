@@ -19,6 +19,10 @@ from .neck import Neck
 from .patch import Level, pyramid
 from .uncertainty import yaw_sigma_deg
 
+SAME_PLACE_M = 0.05
+"""Head centres of the same head are this near."""
+DOUBT_EVERY = 3
+"""The frontal-face detector costs several matchings, so it is asked in every third frame of doubt."""
 SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 """Turns tried about the vertical where the predicted pose does not match."""
 
@@ -65,6 +69,7 @@ class TrackedHead:
         self._neck: Neck | None = None
         self._velocity: Array = np.zeros(6)
         self._matched_ns = 0
+        self._doubts = 0
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
@@ -72,10 +77,10 @@ class TrackedHead:
             return self._initialise(sight)
         dt = (sight.stamp_ns - self._matched_ns) * 1e-9
         found = self._match(sight, self._pose, self._neck, dt)
-        if found is None:
-            return self._hold(dt)
-        self._accept(sight, found, self._pose, dt)
-        return self._state(held_s=0.0)
+        if found is not None:
+            self._accept(sight, found, self._pose, dt)
+        state = self._state(held_s=0.0) if found is not None else self._hold(dt)
+        return self._contradicted(sight, state) or state
 
     # --- start -----------------------------------------------------------------------------------------------------
 
@@ -87,11 +92,28 @@ class TrackedHead:
         if agreed is None:
             return HeadState("initialising")
         pose = frontal_pose(agreed, sight.camera, self._config.haar_width_m, self._config.haar_drop_m)
+        if self._pose is not None and not _same_place(pose, self._pose):
+            return HeadState("initialising")
         levels = self._levels(sight, pose)
-        self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera, 1.5))
+        self._keyframes = Keyframes(self._config.keyframe_spacing_deg, self._config.keyframe_limit)
+        self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera))
+        self._velocity, self._doubts = np.zeros(6), 0
+        self._initialiser = Initialiser(self._config.initial_views)
         self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.stamp_ns
         self._neck = Neck(pose)
         return self._state(held_s=0.0)
+
+    def _contradicted(self, sight: Sight, state: HeadState) -> HeadState | None:
+        """Start anew where the head is thought far away or lost and yet frontal faces are seen; else none."""
+        assert self._pose is not None
+        if state.status == "tracking" and abs(self._pose.angles_deg()[0]) < self._config.doubt_deg:
+            self._doubts, self._initialiser = 0, Initialiser(self._config.initial_views)
+            return None
+        self._doubts += 1
+        if self._doubts % DOUBT_EVERY:
+            return None
+        again = self._initialise(sight)
+        return None if again.status == "initialising" else again
 
     # --- matching --------------------------------------------------------------------------------------------------
 
@@ -103,7 +125,7 @@ class TrackedHead:
         found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
         if found.correlation >= self._config.search_gate:
             return found
-        starts = [turned(pose, turn) for pose in starts[:2] for turn in SEARCH_TURNS_DEG]
+        starts = [turned(pose, turn) for pose in (last, last.moved(step)) for turn in SEARCH_TURNS_DEG]
         other = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
         best = max(found, other, key=lambda m: m.correlation)
         return best if best.correlation >= self._config.gate else None
@@ -122,7 +144,9 @@ class TrackedHead:
         for k in reversed(range(len(levels))):
             views = self._keyframes.nearest(found.pose, self._config.templates)
             templates = [view.templates[k] for view in views]
-            found = match(levels[k], self._surface, templates, found.pose, camera, neck.prior(found.pose, dt), self._config.iterations)
+            found = match(
+                levels[k], self._surface, templates, found.pose, camera, neck.prior(found.pose, dt), self._config.iterations
+            )
         return found
 
     def _levels(self, sight: Sight, pose: Pose) -> list[Level]:
@@ -141,7 +165,7 @@ class TrackedHead:
         self._pose, self._correlation, self._matched_ns = found.pose, found.correlation, sight.stamp_ns
         if found.correlation >= self._config.keyframe_gate and not _hand_near(sight) and self._keyframes.wants(found.pose):
             levels = self._levels(sight, found.pose)
-            self._keyframes.add(take_keyframe(levels, self._surface, found.pose, sight.camera, 1.5))
+            self._keyframes.add(take_keyframe(levels, self._surface, found.pose, sight.camera))
 
     def _hold(self, dt: float) -> HeadState:
         """Below the gate: hold the pose for a while, then say that it is out of range or lost."""
@@ -168,6 +192,13 @@ def turned(pose: Pose, turn_deg: float) -> Pose:
     """The pose with the head turned about its own vertical, toward image right."""
     facing = facing_camera(pose.position_m)
     return replace(pose, rotation=facing @ rotation_of(np.radians(turn_deg), 0.0) @ facing.T @ pose.rotation)
+
+
+def _same_place(one: Pose, other: Pose) -> bool:
+    """Whether two poses can be of one head: the frontal-face detector also fires on walls beside a profile."""
+    scale = other.position_m[2] / one.position_m[2]
+    shift = np.linalg.norm(one.position_m[:2] * scale - other.position_m[:2])
+    return bool(shift < SAME_PLACE_M and 0.75 < scale < 1.33)
 
 
 def _side(yaw_deg: float) -> Side:
