@@ -28,10 +28,10 @@ RUN pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constra
 RUN useradd --uid 10001 --no-create-home --home-dir /var/lib/deixis deixis \
     && install --directory --owner deixis /run/deixis /var/lib/deixis
 COPY config /etc/deixis
+WORKDIR /var/lib/deixis
+CMD ["python", "-m", "deixis_runtime.router", "--config", "/etc/deixis/edge.json5", \
+     "--listen", "unixsock-stream//run/deixis/router.sock", "--listen", "tcp/0.0.0.0:7447"]
 ARG STAGE=
 RUN if [ -n "$STAGE" ]; then pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
     "/wheels/deixis_$STAGE"-*.whl; fi
 USER deixis
-WORKDIR /var/lib/deixis
-CMD ["python", "-m", "deixis_runtime.router", "--config", "/etc/deixis/edge.json5", \
-     "--listen", "unixsock-stream//run/deixis/router.sock", "--listen", "tcp/0.0.0.0:7447"]

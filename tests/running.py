@@ -81,9 +81,23 @@ class System:
 
 @contextmanager
 def system(folder: Path, robot: str, *arguments: object) -> Iterator[System]:
-    """`deixis run` on the example clip, again and again, with these arguments; its registry and log lie in `folder`."""
+    """`deixis run` on the example clip, again and again, with these arguments; its registry and log lie in `folder`.
+
+    In lockstep, so that a busy machine plays it slowly and drops nothing.
+    """
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    options = ["--site", SITE, "--loop", "--robot", robot, "--listen", endpoint, "--registry", folder / "pois.sqlite"]
+    options = [
+        "--site",
+        SITE,
+        "--loop",
+        "--lockstep",
+        "--robot",
+        robot,
+        "--listen",
+        endpoint,
+        "--registry",
+        folder / "pois.sqlite",
+    ]
     log = folder / "log"
     with process(command("deixis", "run", CLIP, *options, *arguments), log) as child:
         wait_until(lambda: child.poll() is not None or answers(endpoint), "a router", START_TIMEOUT_S, log)
