@@ -88,6 +88,9 @@ def _tell(given: argparse.Namespace, scores: Sequence[ClipScore]) -> int:
     if given.json is not None:
         content = report(given.folder, scores, summary, machine, lockstep=given.lockstep)
         given.json.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    unanswered = [score.name for score in scores if score.failure is None and score.frames_answered < score.frames]
+    if given.lockstep and unanswered:
+        print(f"deixis eval: not reproducible, for frames went without an answer: {', '.join(unanswered)}", file=sys.stderr)
     if summary.failed:
         print(f"deixis eval: {len(summary.failed)} of {summary.clips} clips were not played", file=sys.stderr)
         return 1
