@@ -1,0 +1,67 @@
+"""A stage of one's own takes the place of ours, and two of them on one key are noticed."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from running import POINTED_AT, ROOT, command, process, system
+
+SWAP = ROOT / "examples" / "swap_headpose.py"
+
+
+def producers(running):
+    """Who publishes on the key of each stage, by fusion's state."""
+    return {source["stage"]: source["producers"] for source in running.state().get("sources", [])}
+
+
+@pytest.fixture
+def swapped(tmp_path, robot):
+    """The example clip through all stages but headpose, in whose place runs the example; gives (system, log of the example)."""
+    with system(tmp_path, robot, "--except", "headpose") as running:
+        log = tmp_path / "swap"
+        with process([sys.executable, SWAP, "--robot", robot, "--connect", running.endpoint], log):
+            yield running, log
+
+
+def test_the_example_takes_the_place_of_headpose_and_each_evidence_names_its_producer(swapped):
+    running, log = swapped
+
+    def answers_with_the_swap():
+        for target in running.state().get("recent_targets", []):
+            evidence = {item["source"]: item for item in target["evidence"]}
+            if evidence["headpose"]["producer"].startswith("headpose/swap-") and evidence["headpose"]["weight"] > 0:
+                return target
+        return None
+
+    target = running.wait_until(answers_with_the_swap, "an answer that rests on the example's head pose", 120)
+    evidence = {item["source"]: item for item in target["evidence"]}
+    assert evidence["gesture"]["producer"] == "gesture/lockstep"
+    assert "yaw -" in evidence["headpose"]["observed"], "the head is turned to the person's right, which the example sees"
+    assert POINTED_AT in target["poi_ids"], target["reason"]
+    assert "Traceback" not in log.read_text()
+
+
+def test_two_producers_on_one_key_are_noticed_and_said(tmp_path, robot):
+    with system(tmp_path, robot) as running:
+        running.wait_until(lambda: producers(running).get("headpose"), "our head pose stage")
+        with process([sys.executable, SWAP, "--robot", robot, "--connect", running.endpoint], tmp_path / "swap"):
+            both = running.wait_until(lambda: len(found := producers(running)["headpose"]) == 2 and found, "both producers", 60)
+            assert both[0] == "headpose/lockstep"
+            assert both[1].startswith("headpose/swap-")
+            notes = running.wait_until(
+                lambda: [note for note in running.health("fusion")["notes"] if "producers" in note], "a word in fusion's health"
+            )
+            assert "headpose/lockstep" in notes[0]
+            assert "headpose/swap-" in notes[0]
+            doctor = subprocess.run(
+                command("deixis", "doctor", "--robot", robot, "--connect", running.endpoint, "--json"),
+                capture_output=True, text=True, timeout=60, check=False,
+            )  # fmt: skip
+            assert doctor.returncode != 0
+            assert any("headpose" in finding["what"] and "swap-" in finding["what"] for finding in findings(doctor.stdout))
+
+
+def findings(text):
+    """What `deixis doctor --json` found wrong."""
+    return [finding for finding in json.loads(text)["findings"] if finding["level"] == "wrong"]
