@@ -17,8 +17,8 @@ from .topics import TOPICS
 
 _NOTES = """
 Payloads are msgpack maps with the encoding `application/msgpack;Type/version`; binary fields are msgpack `bin`. A get with
-`?format=json` is answered in JSON (`application/json`), binary fields in URL-safe base64 (RFC 4648, section 5). Samples of both are
-beside this page as `Type.golden.msgpack` and `Type.golden.json`, the JSON Schema as `Type.schema.json`.
+`?format=json` is answered in JSON (`application/json`), binary fields in URL-safe base64 (RFC 4648, section 5). Samples of both
+are beside this page as `Type.golden.msgpack` and `Type.golden.json`, the JSON Schema as `Type.schema.json`.
 """
 
 
