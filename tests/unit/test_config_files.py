@@ -1,0 +1,38 @@
+"""The Zenoh settings and the site that ship load as they are."""
+
+import json
+import shutil
+import subprocess
+
+import pytest
+from deixis_runtime.router import router_config
+from deixis_runtime.site import load_site
+from running import ROOT
+
+SETTINGS = sorted((ROOT / "config").glob("*.json5"))
+SITES = sorted((ROOT / "config" / "sites").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SETTINGS, ids=lambda path: path.name)
+def test_our_router_takes_the_settings_and_the_endpoints_of_the_command_line(path):
+    config = router_config(["tcp/127.0.0.1:1"], ["tcp/127.0.0.1:2"], path)
+    assert json.loads(config.get_json("mode")) == "router"
+    assert json.loads(config.get_json("transport/link/tx/lease")) == 2000
+    assert json.loads(config.get_json("scouting/multicast/enabled")) is False
+    assert json.loads(config.get_json("listen/endpoints")) == ["tcp/127.0.0.1:1"]
+    assert json.loads(config.get_json("connect/endpoints")) == ["tcp/127.0.0.1:2"]
+
+
+@pytest.mark.skipif(shutil.which("zenohd") is None, reason="there is no zenohd here")
+@pytest.mark.parametrize("path", SETTINGS, ids=lambda path: path.name)
+def test_zenohd_takes_the_settings(path, free_port):
+    argv = ["zenohd", "-c", path, "-l", f"tcp/127.0.0.1:{free_port}"]
+    with pytest.raises(subprocess.TimeoutExpired):  # it goes on running
+        subprocess.run(argv, check=True, timeout=2)
+
+
+@pytest.mark.parametrize("path", SITES, ids=lambda path: path.name)
+def test_the_example_sites_load(path):
+    site = load_site(path)
+    assert site.pois
+    assert site.walls
