@@ -62,9 +62,15 @@ class LineView:
             self._say(f"camera {summary.camera}")
         elif isinstance(message, Target):
             self._say(wording.target_line(message, summary.names))
-        elif isinstance(message, self._beat) and (summary.clip_s >= self._due_s or summary.clip_s < self._due_s - 2):
+        elif self._is_due(message):
             self._due_s = summary.clip_s + LINE_EVERY_S
             self._say(summary.line())
+
+    def _is_due(self, message: Message) -> bool:
+        behind_s = self._summary.clip_s - self._due_s
+        if isinstance(message, self._beat):
+            return behind_s >= 0 or behind_s < -2  # played anew, as with --loop
+        return isinstance(message, Frame) and behind_s > LINE_EVERY_S  # fusion is there, but answers nothing
 
     def _say(self, text: str) -> None:
         self._console.out(text, highlight=False)

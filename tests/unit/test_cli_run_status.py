@@ -4,6 +4,7 @@ import json
 import signal
 
 import pytest
+from deixis_cli.live_view import LineView
 from deixis_cli.play import PlayResult
 from deixis_cli.run import document, exit_status, print_answers
 from deixis_cli.summary import Summary
@@ -98,3 +99,11 @@ def test_rate_and_drops_are_those_of_the_clip():
     assert summary.rate_hz() == pytest.approx(20)
     assert summary.clip_s == pytest.approx(3.0)
     assert summary.drops() == 10  # 11 unanswered, of which the last may still be on its way
+
+
+def test_lines_are_printed_although_fusion_answers_nothing():
+    console = Console(record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    view = LineView(console, {}, ("camera", "fusion"))
+    for seq in range(91):
+        view.hear("", FRAME.model_copy(update={"seq": seq, "stamp_ns": 10**18 + seq * 33_333_333}))
+    assert 2 <= len(console.export_text().splitlines()) <= 6
