@@ -14,7 +14,6 @@ from .messages import TYPES, Message
 from .samples import SAMPLES
 from .topics import TOPICS
 
-
 _NOTES = """
 Payloads are msgpack maps with the encoding `application/msgpack;Type/version`; binary fields are msgpack `bin`. A get with
 `?format=json` is answered in JSON (`application/json`), binary fields in URL-safe base64 (RFC 4648, section 5). Samples of both
