@@ -243,7 +243,7 @@ class CameraStage:
         state = self._status.state
         if self._node.lockstep and state == "starting":
             return False  # how often the start changes what is known depends on the machine; two runs are to be equal
-        if self._node.lockstep and state == "streaming":
+        if self._node.lockstep and state in ("streaming", "ended"):
             return self._status.changed or self._frames_since_info >= INFO_PERIOD_FRAMES
         return self._status.changed or now_s >= self._info_due_s
 
