@@ -18,9 +18,8 @@ def painted_head(pose: Pose, gain: float = 1.0, offset: float = 0.0) -> np.ndarr
     grey = 128 + 40 * np.sin(7 * x + 1) + 30 * np.cos(6 * y) + 25 * np.sin(5 * z + 2 * x)
     seen = project(dense, pose, CAMERA)
     total, count = np.zeros((240, 320)), np.zeros((240, 320))
-    front = seen.facing > 0
-    at = np.rint(seen.pixels[front]).astype(int)
-    np.add.at(total, (at[:, 1], at[:, 0]), grey[front])
+    at = np.rint(seen.pixels).astype(int)
+    np.add.at(total, (at[:, 1], at[:, 0]), grey[seen.points])
     np.add.at(count, (at[:, 1], at[:, 0]), 1)
     picture = np.where(count > 0, total / np.maximum(count, 1), 90.0)
     return np.clip(gain * picture + offset, 0, 255).astype(np.uint8)

@@ -23,7 +23,7 @@ class HeadposeConfig(BaseModel):
     head_semi_axes_m: tuple[float, float, float] = Field(
         default=(0.080, 0.115, 0.085), description="Semi-axes of the head's ellipsoid: across, up, along, metres."
     )
-    surface_points: int = Field(default=900, ge=200, le=10000, description="Points spread over the whole ellipsoid.")
+    surface_points: int = Field(default=600, ge=200, le=10000, description="Points spread over the whole ellipsoid.")
     working_width_px: float = Field(default=64.0, ge=24, le=400, description="Heads wider than this are scaled down, pixels.")
     pyramid_levels: int = Field(default=3, ge=1, le=5, description="Resolution levels of the matching.")
     iterations: int = Field(default=5, ge=1, le=50, description="Iterations per level at most.")
@@ -32,6 +32,9 @@ class HeadposeConfig(BaseModel):
     keyframe_spacing_deg: float = Field(default=14.0, gt=1, le=45, description="A new keyframe where none is this near.")
     keyframe_limit: int = Field(default=60, ge=1, le=500, description="Keyframes of one head at most.")
     gate: float = Field(default=0.75, gt=0, lt=1, description="Unweighted correlation below which a match is not believed.")
+    still_gate: float = Field(
+        default=0.96, gt=0, lt=1, description="Correlation above which a head that was still is not looked for elsewhere."
+    )
     search_gate: float = Field(default=0.90, gt=0, lt=1, description="Correlation below which other starts are tried as well.")
     keyframe_gate: float = Field(default=0.82, gt=0, lt=1, description="Correlation needed to take a keyframe.")
 
@@ -44,5 +47,5 @@ class HeadposeConfig(BaseModel):
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 
     initial_views: int = Field(default=3, ge=1, le=30, description="Frontal detections that must agree to start a head.")
-    haar_width_m: float = Field(default=0.177, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
+    haar_width_m: float = Field(default=0.192, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
     haar_drop_m: float = Field(default=0.006, ge=-0.1, le=0.1, description="How far that box's centre lies below the head's.")

@@ -8,6 +8,7 @@ along the optical axis: the nose is at -z, the person's left ear at +x.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -47,8 +48,7 @@ class Pose:
 
     def angle_to(self, other: Pose) -> float:
         """Angle of the rotation between the two poses as each is seen from the camera, degrees."""
-        between = self.seen().T @ other.seen()
-        return float(np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1))))
+        return angle_between(self.seen(), other.seen())
 
     def seen(self) -> Array:
         """Rotation (3, 3) relative to the line head -> camera; identity for a head that looks into the camera."""
@@ -58,23 +58,23 @@ class Pose:
         """Yaw (toward image right), pitch (up), roll (crown to image right) relative to the line head -> camera, degrees."""
         seen = self.seen()
         nose = seen @ NOSE
-        yaw = np.arctan2(nose[0], -nose[2])
-        pitch = np.arcsin(np.clip(-nose[1], -1, 1))
+        yaw = math.atan2(nose[0], -nose[2])
+        pitch = math.asin(min(max(-nose[1], -1.0), 1.0))
         crown = (rotation_of(yaw, pitch).T @ seen) @ np.array([0.0, -1.0, 0.0])
-        roll = np.arctan2(crown[0], -crown[1])
-        return float(np.degrees(yaw)), float(np.degrees(pitch)), float(np.degrees(roll))
+        roll = math.atan2(crown[0], -crown[1])
+        return math.degrees(yaw), math.degrees(pitch), math.degrees(roll)
+
+
+def angle_between(one: Array, other: Array) -> float:
+    """Angle of the rotation that leads from one rotation (3, 3) to another, degrees."""
+    cosine = (float(np.vdot(one, other)) - 1) / 2
+    return math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
 
 
 def rotation_of(yaw: float, pitch: float, roll: float = 0.0) -> Array:
     """Rotation (3, 3) that turns the nose by `yaw` to image right, then `pitch` up; crown by `roll` to image right. Radians."""
-    cos_y, sin_y, cos_p, sin_p, cos_r, sin_r = (
-        np.cos(yaw),
-        np.sin(yaw),
-        np.cos(pitch),
-        np.sin(pitch),
-        np.cos(roll),
-        np.sin(roll),
-    )
+    cos_y, sin_y, cos_p, sin_p = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    cos_r, sin_r = math.cos(roll), math.sin(roll)
     about_y = np.array([[cos_y, 0, -sin_y], [0, 1, 0], [sin_y, 0, cos_y]])
     about_x = np.array([[1, 0, 0], [0, cos_p, sin_p], [0, -sin_p, cos_p]])
     about_z = np.array([[cos_r, -sin_r, 0], [sin_r, cos_r, 0], [0, 0, 1]])
@@ -83,8 +83,8 @@ def rotation_of(yaw: float, pitch: float, roll: float = 0.0) -> Array:
 
 def facing_camera(position_m: Array) -> Array:
     """Rotation (3, 3) of a head at `position_m` that looks straight into the camera, crown up."""
-    toward = -position_m / np.linalg.norm(position_m)
-    return rotation_of(float(np.arctan2(toward[0], -toward[2])), float(np.arcsin(np.clip(-toward[1], -1, 1))))
+    x, y, z = (float(v) for v in position_m)
+    return rotation_of(math.atan2(-x, z), math.atan2(y, math.hypot(x, z)))
 
 
 @dataclass(frozen=True)
@@ -109,32 +109,42 @@ def ellipsoid(semi_axes_m: tuple[float, float, float], count: int, highest: floa
 
 
 class Projection(NamedTuple):
-    """Where the surface points of a posed head appear."""
+    """Where the surface points of a posed head appear that face the camera."""
 
+    points: NDArray[np.intp]
+    """(M,) which points of the surface; all arrays below speak of these."""
     pixels: Array
-    """(N, 2) in the picture."""
+    """(M, 2) in the picture."""
     facing: Array
-    """(N,) cosine between normal and line of sight; negative on the far side."""
-    jacobian: Array
-    """(N, 2, 6) of the pixels by a step of the pose (rotation vector, shift)."""
+    """(M,) cosine between normal and line of sight."""
+    offsets: Array
+    """(M, 3) from the head's centre, camera axes, metres."""
+    rays: Array
+    """(M, 3) line of sight: x / z, y / z, 1."""
+    px_per_m: Array
+    """(M,) size of a metre at the point."""
+
+    def by_pose(self, gradients: Array) -> Array:
+        """Derivative (M, 6) of a function of the picture by a step of the pose (rotation vector, shift).
+
+        gradients: (M, 2), of the function by the pixel. A shift moves the point itself, a turn w by w x offset.
+        """
+        by_shift = np.empty_like(self.offsets)
+        by_shift[:, :2] = gradients * self.px_per_m[:, None]
+        by_shift[:, 2] = -(by_shift[:, 0] * self.rays[:, 0] + by_shift[:, 1] * self.rays[:, 1])
+        (x, y, z), (a, b, c) = self.offsets.T, by_shift.T
+        return np.stack([y * c - z * b, z * a - x * c, x * b - y * a, a, b, c], axis=1)
 
 
-def project(surface: Surface, pose: Pose, camera: Camera) -> Projection:
-    """Project all surface points of a posed head. Points must lie before the camera; others give facing -1."""
-    offset = surface.points_m @ pose.rotation.T
-    x, y, z = (offset + pose.position_m).T
-    z = np.maximum(z, 0.05)
-    u, v = x / z, y / z
-    pixels = np.stack([camera.focal_px * u + camera.centre_x_px, camera.focal_px * v + camera.centre_y_px], axis=1)
-    normals = surface.normals @ pose.rotation.T
-    sight = np.stack([u, v, np.ones_like(u)], axis=1)
-    facing = -np.einsum("ij,ij->i", normals, sight) / np.linalg.norm(sight, axis=1)
-    k = camera.focal_px / z
-    dx, dy, dz = offset.T
-    jacobian = np.empty((len(z), 2, 6))
-    jacobian[:, 0, 3], jacobian[:, 0, 4], jacobian[:, 0, 5] = k, 0.0, -k * u
-    jacobian[:, 1, 3], jacobian[:, 1, 4], jacobian[:, 1, 5] = 0.0, k, -k * v
-    # d(w x offset)/dw: a turn about x moves a point by (0, -dz, dy), about y by (dz, 0, -dx), about z by (-dy, dx, 0).
-    jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 0, 2] = -k * u * dy, k * (dz + u * dx), -k * dy
-    jacobian[:, 1, 0], jacobian[:, 1, 1], jacobian[:, 1, 2] = -k * (dz + v * dy), k * v * dx, k * dx
-    return Projection(pixels, facing, jacobian)
+def project(surface: Surface, pose: Pose, camera: Camera, least_facing: float = 0.0) -> Projection:
+    """Project the points of a posed head whose normals face the camera by a cosine above `least_facing`."""
+    place, normals = pose.position_m, surface.normals @ pose.rotation.T
+    offsets = surface.points_m @ pose.rotation.T
+    at = offsets + place
+    distance = np.sqrt(np.einsum("ij,ij->i", at, at))
+    facing = -np.einsum("ij,ij->i", normals, at) / distance
+    points = np.flatnonzero((facing > least_facing) & (at[:, 2] > 0.05))
+    at = at[points]
+    rays = at / at[:, 2:]
+    pixels = camera.focal_px * rays[:, :2] + (camera.centre_x_px, camera.centre_y_px)
+    return Projection(points, pixels, facing[points], offsets[points], rays, camera.focal_px / at[:, 2])

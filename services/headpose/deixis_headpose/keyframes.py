@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .head import Camera, Pose, Surface
-from .lsm import Template, observe
+from .head import Array, Camera, Pose, Surface, angle_between
+from .lsm import Template, observe, template_of
 from .patch import Level
 
 
@@ -21,13 +21,15 @@ class Keyframe:
     """One view: the pose and a template per pyramid level."""
 
     pose: Pose
+    seen: Array
+    """Rotation (3, 3) of the pose relative to the line head -> camera."""
     templates: tuple[Template, ...]
 
 
 def take_keyframe(levels: Sequence[Level], surface: Surface, pose: Pose, camera: Camera) -> Keyframe:
     """Read the head's texture from a picture at a known pose."""
-    seen = [observe(level, surface, pose, camera) for level in levels]
-    return Keyframe(pose, tuple(Template(o.values, o.weights) for o in seen))
+    views = (observe(level, surface, pose, camera) for level in levels)
+    return Keyframe(pose, pose.seen(), tuple(template_of(view, len(surface.points_m)) for view in views))
 
 
 @dataclass
@@ -40,12 +42,14 @@ class Keyframes:
 
     def nearest(self, pose: Pose, count: int) -> list[Keyframe]:
         """The `count` views seen from the directions closest to the pose, closest first."""
-        order = np.argsort([view.pose.angle_to(pose) for view in self.views], kind="stable")
+        seen = pose.seen()
+        order = np.argsort([angle_between(view.seen, seen) for view in self.views], kind="stable")
         return [self.views[i] for i in order[:count]]
 
     def wants(self, pose: Pose) -> bool:
         """Whether no view is within the spacing of the pose."""
-        return len(self.views) < self.limit and all(view.pose.angle_to(pose) >= self.spacing_deg for view in self.views)
+        seen = pose.seen()
+        return len(self.views) < self.limit and all(angle_between(view.seen, seen) >= self.spacing_deg for view in self.views)
 
     def add(self, view: Keyframe) -> None:
         """Keep a view."""

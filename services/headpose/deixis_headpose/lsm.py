@@ -16,6 +16,8 @@ from .head import Array, Camera, Pose, Projection, Surface, project
 from .patch import Level
 
 HUBER = 1.345
+LEAST_FACING = 0.26
+"""Cosine of obliqueness at which points begin to count."""
 MIN_POINTS = 40
 INDEPENDENT = 0.0075
 """Share of the residuals that counts as independent: neighbouring ones are model error and move together."""
@@ -33,7 +35,7 @@ class Template(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """The picture as seen through a pose."""
+    """The picture as seen through a pose, at the M points of the projection."""
 
     projection: Projection
     values: Array
@@ -62,14 +64,22 @@ class Match(NamedTuple):
 
 def observe(level: Level, surface: Surface, pose: Pose, camera: Camera) -> Observation:
     """Sample the picture at all surface points; weights fall off toward the outline (the paper: toward the patch border)."""
-    projection = project(surface, pose, camera)
+    projection = project(surface, pose, camera, LEAST_FACING)
     values, gradients, inside = level.sample(projection.pixels)
     return Observation(projection, values, gradients, facing_weights(projection.facing) * inside)
 
 
+def template_of(observation: Observation, surface_points: int) -> Template:
+    """Keep what is seen as a template for a surface of so many points."""
+    values, weights = np.zeros(surface_points), np.zeros(surface_points)
+    values[observation.projection.points] = observation.values
+    weights[observation.projection.points] = observation.weights
+    return Template(values, weights)
+
+
 def facing_weights(facing: Array) -> Array:
     """0 at 75 degrees obliqueness and beyond, 1 up to 55: near the outline background and model error take over."""
-    return np.clip((facing - 0.26) / 0.31, 0.0, 1.0)
+    return np.minimum((facing - LEAST_FACING) / 0.31, 1.0).clip(0.0)
 
 
 def correlation(observation: Observation, templates: Sequence[Template]) -> float:
@@ -112,33 +122,38 @@ def _solve(
     observation: Observation, templates: Sequence[Template], prior: Prior, travelled: Array
 ) -> tuple[Array, Array] | None:
     """One linearised solution: pose step (6,) and its covariance (6, 6); none where too few points are seen."""
-    by_pose = np.einsum("ni,nij->nj", observation.gradients, observation.projection.jacobian)
-    count = 6 + 2 * len(templates)
-    normal, right = np.zeros((count, count)), np.zeros(count)
-    for k, template in enumerate(templates):
-        seen = np.flatnonzero(observation.weights * template.weights)
-        if len(seen) < MIN_POINTS:
-            continue
-        weights = observation.weights[seen] * template.weights[seen]
-        f, g = template.values[seen], observation.values[seen]
-        gain, offset = _radiometric(f, g, weights)
-        residual = gain * f + offset - g
-        noise = max(1.4826 * float(np.median(np.abs(residual))), MIN_NOISE)
-        huber = np.minimum(1.0, HUBER * noise / np.maximum(np.abs(residual), 1e-9))
-        p = weights * huber / noise**2
-        design = np.column_stack([by_pose[seen], -f, -np.ones(len(seen))])
-        weighted = design * p[:, None]
-        rows = np.r_[0:6, 6 + 2 * k, 7 + 2 * k]
-        normal[np.ix_(rows, rows)] += weighted.T @ design
-        right[rows] += weighted.T @ residual
-    if not np.any(normal[:6, :6]):
+    by_pose = observation.projection.by_pose(observation.gradients)
+    normal, right = np.zeros((6, 6)), np.zeros(6)
+    for template in templates:
+        weights = observation.weights * template.weights[observation.projection.points]
+        seen = np.flatnonzero(weights)
+        if len(seen) >= MIN_POINTS:
+            f, g = template.values[observation.projection.points[seen]], observation.values[seen]
+            part_normal, part_right = _pose_equations(by_pose[seen], f, g, weights[seen])
+            normal += part_normal
+            right += part_right
+    if not np.any(normal):
         return None
-    normal, right = INDEPENDENT * normal, INDEPENDENT * right
-    normal[:6, :6] += prior.information
-    right[:6] += prior.right - prior.information @ travelled
-    normal[range(6, count), range(6, count)] += 1e-6
+    normal = INDEPENDENT * normal + prior.information
+    right = INDEPENDENT * right + prior.right - prior.information @ travelled
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-    return (inverse @ right)[:6], inverse[:6, :6]
+    return inverse @ right, inverse
+
+
+def _pose_equations(by_pose: Array, f: Array, g: Array, weights: Array) -> tuple[Array, Array]:
+    """Normal equations (6, 6) and right side (6,) of the pose by one template, its gain and offset eliminated."""
+    gain, offset = _radiometric(f, g, weights)
+    residual = gain * f + offset - g
+    size = np.abs(residual)
+    noise = max(1.4826 * float(np.partition(size, len(size) // 2)[len(size) // 2]), MIN_NOISE)
+    p = weights * np.minimum(1.0, HUBER * noise / np.maximum(size, 1e-9)) / noise**2
+    design = np.column_stack([by_pose, -f, -np.ones(len(f)), residual])
+    joint = (design * p[:, None]).T @ design
+    light = joint[6:8, 6:8] + 1e-6 * np.eye(2)
+    eliminated = joint[:6, 6:8] @ np.linalg.inv(light)
+    normal = joint[:6, :6] - eliminated @ joint[6:8, :6]
+    right = joint[:6, 8] - eliminated @ joint[6:8, 8]
+    return normal, right
 
 
 def _radiometric(f: Array, g: Array, weights: Array) -> tuple[float, float]:
@@ -151,11 +166,12 @@ def _radiometric(f: Array, g: Array, weights: Array) -> tuple[float, float]:
 
 
 def _correlation(observation: Observation, template: Template) -> tuple[float, float]:
-    weights = observation.weights * template.weights
+    points = observation.projection.points
+    weights, values = observation.weights * template.weights[points], template.values[points]
     total = float(weights.sum())
     if np.count_nonzero(weights) < MIN_POINTS:
         return 0.0, total
-    f = template.values - weights @ template.values / total
+    f = values - weights @ values / total
     g = observation.values - weights @ observation.values / total
     spread = float((weights @ f**2) * (weights @ g**2))
     return float(weights @ (f * g)) / spread**0.5 if spread > 1e-9 else 0.0, total

@@ -23,6 +23,8 @@ SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
 DOUBT_EVERY = 3
 """The frontal-face detector costs several matchings, so it is asked in every third frame of doubt."""
+STILL_TURN, STILL_SHIFT_M = np.radians(1.0), 0.002
+"""A head that moved less than this in the last frame is matched on the finest level only."""
 SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 """Turns tried about the vertical where the predicted pose does not match."""
 
@@ -70,6 +72,7 @@ class TrackedHead:
         self._velocity: Array = np.zeros(6)
         self._matched_ns = 0
         self._doubts = 0
+        self._gone: Side | None = None
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
@@ -121,6 +124,10 @@ class TrackedHead:
         """Match the keyframes to the frame, from the predicted pose, else by a search; none where the gate stays shut."""
         levels = self._levels(sight, last)
         step = self._velocity * dt
+        if np.linalg.norm(step[:3]) < STILL_TURN and np.linalg.norm(step[3:]) < STILL_SHIFT_M:
+            found = self._refine(levels[:1], last, sight.camera, neck, dt)
+            if found.correlation >= self._config.still_gate:
+                return found
         starts = [last, last.moved(step), last.moved(1.6 * step)]
         found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
         if found.correlation >= self._config.search_gate:
@@ -177,14 +184,17 @@ class TrackedHead:
         if dt <= self._config.hold_s:
             return self._state(held_s=dt)
         if abs(yaw) >= self._config.turned_deg:
-            return HeadState("out_of_range", side=_side(yaw))
+            return HeadState("out_of_range", side=self._gone or _side(yaw))
         return HeadState("lost")
 
     def _state(self, held_s: float) -> HeadState:
         assert self._pose is not None
         angles = self._pose.angles_deg()
         if abs(angles[0]) > self._config.range_deg:
-            return HeadState("out_of_range", side=_side(angles[0]))
+            # The back of a head carries little texture, and its yaw may pass 180: the side is the one it left to.
+            self._gone = self._gone or _side(angles[0])
+            return HeadState("out_of_range", side=self._gone)
+        self._gone = None
         return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
 
 
