@@ -1,6 +1,6 @@
-# One image per service, from one file: STAGE names the distribution that goes in; without it, the image of the router and of
-# the `deixis` command. All share the layers up to ARG STAGE. Needs no BuildKit.
-#   docker build --build-arg STAGE=tracker --tag deixis-tracker .
+# STAGES names the stages that go in; without it, the image of the router and of the `deixis` command. So a robot holds its
+# camera alone. All share the layers up to ARG STAGES. Needs no BuildKit.
+#   docker build --build-arg STAGES=camera --tag deixis-camera .
 
 FROM python:3.11-slim-bookworm AS wheels
 RUN pip install --quiet --no-cache-dir --root-user-action ignore hatchling
@@ -31,7 +31,7 @@ COPY config /etc/deixis
 WORKDIR /var/lib/deixis
 CMD ["python", "-m", "deixis_runtime.router", "--config", "/etc/deixis/edge.json5", \
      "--listen", "unixsock-stream//run/deixis/router.sock", "--listen", "tcp/0.0.0.0:7447"]
-ARG STAGE=
-RUN if [ -n "$STAGE" ]; then pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
-    "/wheels/deixis_$STAGE"-*.whl; fi
+ARG STAGES=
+RUN for stage in $STAGES; do set -- "$@" /wheels/deixis_$stage-*.whl; done; [ $# -eq 0 ] \
+    || pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt "$@"
 USER deixis

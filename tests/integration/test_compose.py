@@ -75,7 +75,7 @@ def compose():
 
 @pytest.fixture(scope="module")
 def images(compose):
-    """The images of all services, built from this checkout."""
+    """The three images, built from this checkout."""
     if run("docker", "image", "inspect", BASE, check=False).returncode:
         pulled = run("docker", "pull", "--quiet", BASE, check=False, timeout=120)
         if pulled.returncode and not STAND_IN.exists():
