@@ -47,5 +47,5 @@ class HeadposeConfig(BaseModel):
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 
     initial_views: int = Field(default=3, ge=1, le=30, description="Frontal detections that must agree to start a head.")
-    haar_width_m: float = Field(default=0.192, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
+    haar_width_m: float = Field(default=0.197, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
     haar_drop_m: float = Field(default=0.006, ge=-0.1, le=0.1, description="How far that box's centre lies below the head's.")

@@ -13,11 +13,11 @@ from .lsm import Prior
 
 LEVER_M = 0.032
 """How far before the axis that it turns about the head's centre lies; 0.03 for the neck alone, more with the torso."""
-SIGMA_M = np.array([0.015, 0.02, 0.004])
+SIGMA_M = np.array([0.022, 0.02, 0.004])
 """How well the neck's place is known: across, up, along the line of sight."""
 TURN_SIGMA = np.radians([25.0, 60.0, 25.0])
 """Turn from one frame to the next about x, y, z: wide, for a prior on the yaw shortens fast turns."""
-FOLLOW, FOLLOW_SPEED = 0.15, 0.015
+FOLLOW, FOLLOW_SPEED = 0.2, 0.025
 """Gains of the constant-velocity filter of the neck, per frame at 30 frames a second."""
 
 
