@@ -32,11 +32,13 @@ def read_clip(path: Path, rng: np.random.Generator) -> tuple[Array, Array]:
     labels = np.load(path.with_name(path.stem + "_labels.npz"))
     names = sorted(labels.files)
     capture = cv2.VideoCapture(str(path))
-    skin, other = [], []
+    skin: list[Array] = []
+    other: list[Array] = []
     for index in np.linspace(0, len(names) - 1, FRAMES_PER_CLIP).astype(int):
         capture.set(cv2.CAP_PROP_POS_FRAMES, int(index))
-        image = capture.read()[1].reshape(-1, 3)
-        is_skin = (cv2.imdecode(labels[names[index]], cv2.IMREAD_UNCHANGED) & SKIN_BIT).reshape(-1) > 0
+        image = np.asarray(capture.read()[1], np.uint8).reshape(-1, 3)
+        label = np.asarray(cv2.imdecode(labels[names[index]], cv2.IMREAD_UNCHANGED), np.int64)
+        is_skin = (label & SKIN_BIT).reshape(-1) > 0
         for pixels, kept in ((image[is_skin], skin), (image[~is_skin], other)):
             if len(pixels):
                 kept.append(rng.choice(pixels, min(PIXELS_PER_FRAME, len(pixels)), replace=False).astype(float))

@@ -42,7 +42,7 @@ def test_face_and_pointing_hand_of_a_clip_are_found(rendered):
 
 def test_an_empty_room_with_flickering_light_has_nobody_in_it(rendered):
     tracker = Tracker(TrackerConfig())
-    assert not any(tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / "a09_empty_flicker.mp4"))
+    assert not any(tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / "a09_empty_flicker.mp4", count=60))
 
 
 @pytest.mark.parametrize("name", ["c19_point_m40_crossarm"])
@@ -50,5 +50,5 @@ def test_two_runs_on_the_same_frames_are_equal(rendered, name):
     runs = []
     for _ in range(2):
         tracker = Tracker(TrackerConfig())
-        runs.append([tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / f"{name}.mp4", count=40)])
+        runs.append([tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / f"{name}.mp4", count=50)])
     assert runs[0] == runs[1]

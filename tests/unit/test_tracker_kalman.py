@@ -23,3 +23,14 @@ def test_uncertainty_grows_unseen_and_shrinks_when_seen():
     assert unseen > 1.0
     point.correct(0, 0, 1.0)
     assert point.sigma_px < min(1.0, unseen)
+
+
+def test_the_speed_is_bounded_and_a_point_found_again_is_at_rest():
+    point = PointFilter(0, 0, 1.0, 3000.0)
+    point.predict(1 / 30)
+    point.correct(200, 0, 1.0)
+    point.limit(100)
+    assert point.vx == pytest.approx(100)
+    point.restart(50, 60, 2.0)
+    point.predict(1 / 30)
+    assert (point.x, point.y) == (50, 60)

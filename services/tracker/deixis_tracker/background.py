@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
 
 UPDATE_EVERY = 3  # frames
-GRID = 8  # the gain is fitted on every 8th pixel
+GRID = 4  # the gain is fitted on every 4th pixel of the coarse picture
 UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, changed
 SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07
@@ -26,7 +26,7 @@ SHADOW_DARKEST = 0.35
 
 
 class Background:
-    """Mean picture of the room. Call `changed`, then `update`, once a frame."""
+    """Mean picture of the room, at the resolution of the first one. Call `changed`, then `update`, once a frame."""
 
     def __init__(self, image: Image, threshold: int) -> None:
         """Start from the first (H, W, 3) BGR picture; `threshold` in grey levels."""
@@ -51,6 +51,11 @@ class Background:
         largest = cv2.max(cv2.max(b, g), r)
         return np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
 
+    @property
+    def room(self) -> Image:
+        """(H, W, 3) the room as it would look now, under the light of the last picture."""
+        return self._expected
+
     def remove_shadow(self, image: Image, mask: Mask) -> Mask:
         """`mask` without pixels that are the room, darker and of the same colour: the shadow of a person."""
         rows, columns = np.nonzero(mask)
@@ -70,8 +75,8 @@ class Background:
         """Learn the room where no person is: steady places quickly, changed ones slowly, all at once when the light changed."""
         self._frames += 1
         room = frozen == 0
-        room_size = int(np.count_nonzero(room[::4, ::4]))
-        moved = int(np.count_nonzero(changed[::4, ::4] * room[::4, ::4]))
+        room_size = int(np.count_nonzero(room[::2, ::2]))
+        moved = int(np.count_nonzero(changed[::2, ::2] * room[::2, ::2]))
         if room_size and moved > UPHEAVAL * room_size:
             self.unstable = 12
         self.unstable = max(0, self.unstable - 1)

@@ -21,7 +21,7 @@ KINDS: tuple[HandKind, ...] = ("left_hand", "right_hand", "unknown")
 HANGING_BELOW = 2.0  # face widths below the face
 RATE_PER_S = 8.0  # independent observations a second
 MEMORY = 7.0  # most log odds that are kept
-SIDE_BONUS = 1.5
+RAISED = 1.2  # what is skin-coloured and stands out from the room high up is likelier a hand
 
 
 class Features(NamedTuple):
@@ -32,6 +32,7 @@ class Features(NamedTuple):
     speed: float
     area: float
     evidence: float  # share of the blob that moved or changed against the background, 0 to 1
+    sure: float  # mean P(skin) of the blob, 0 to 1
 
 
 def _normal(value: float, mean: float, sigma: float) -> float:
@@ -42,8 +43,13 @@ def log_likelihoods(f: Features) -> dict[HandKind, float]:
     """Log likelihood of the features for each kind, up to a common constant."""
     mean, sigma = (1.2, 0.8) if f.dy > HANGING_BELOW else (1.3, 1.9)
     size = math.log(max(f.area, 1e-3))
-    hand = _normal(size, math.log(0.3), 0.7) + math.log(0.25 + 0.75 * f.evidence) + math.log(0.4 + min(0.6, 0.2 * f.speed))
-    other = _normal(size, math.log(0.3), 1.5) + math.log(0.9 - 0.6 * f.evidence) + math.log(0.7 - min(0.5, 0.2 * f.speed))
+    hand = _normal(size, math.log(0.37), 0.45) + math.log(0.25 + 0.75 * f.evidence) + math.log(0.4 + min(0.6, 0.2 * f.speed))
+    other = _normal(size, math.log(0.25), 1.2) + math.log(0.9 - 0.6 * f.evidence) + math.log(0.7 - min(0.5, 0.2 * f.speed))
+    # Furniture, trousers and floors that pass for skin do so by a little.
+    hand += _normal(f.sure, 0.85, 0.13)
+    other += _normal(f.sure, 0.65, 0.2)
+    if f.dy < HANGING_BELOW:
+        hand += RAISED
     return {
         "left_hand": hand + _normal(f.dx, mean, sigma),
         "right_hand": hand + _normal(f.dx, -mean, sigma),
@@ -64,10 +70,6 @@ class HandBelief:
             self._log[kind] += weight * value
         top = max(self._log.values())
         self._log = {kind: max(value - top, -MEMORY) for kind, value in self._log.items()}
-
-    def favour(self, kind: HandKind) -> None:
-        """Add knowledge from outside, e.g. that the other hand was seen elsewhere at that time."""
-        self._log[kind] += SIDE_BONUS
 
     def log(self, kind: HandKind) -> float:
         """Log belief in a kind, up to a constant that all kinds of this track share."""

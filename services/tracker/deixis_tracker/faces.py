@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deixis_tracker.boxes import Box, around
+from deixis_tracker.coarse import COARSE
 from deixis_tracker.config import TrackerConfig
 
 Image = NDArray[np.uint8]
@@ -91,7 +92,7 @@ class FaceDetector:
         self.candidates: list[Candidate] = []
 
     def search(self, grey: Image, skin: Image, tracked: int) -> None:
-        """Do the jobs of this frame; new hits become candidates. `skin`: P(skin) as uint8; `tracked`: number of faces known."""
+        """Do the jobs of this frame; new hits become candidates. `skin`: coarse P(skin); `tracked`: number of faces known."""
         self._frame += 1
         if tracked and self.searched_all and self._frame % SEARCH_EVERY_WITH_FACE:
             return
@@ -142,7 +143,7 @@ class FaceDetector:
     def _run(self, job: Job, grey: Image, skin: Image) -> bool:
         """Do one job; false when it was skipped since there is too little skin for a face."""
         size = WINDOW_PX / job.scale
-        if np.count_nonzero(skin[job.top : job.bottom : 4, ::4] > 60) * 16 < 0.2 * size * size:
+        if np.count_nonzero(skin[job.top // 2 : job.bottom // 2 : 2, ::2] > 60) * 16 < 0.2 * size * size:
             return False
         strip = grey[job.top : job.bottom]
         small = cv2.resize(strip, None, fx=job.scale, fy=job.scale, interpolation=cv2.INTER_AREA)
@@ -159,7 +160,7 @@ class FaceDetector:
 
 
 def skin_share(skin: Image, candidate: Candidate) -> float:
-    """Mean P(skin) in the middle of a face, 0 to 1."""
+    """Mean P(skin), of a coarse map, in the middle of a face, 0 to 1."""
     half = 0.3 * candidate.width
-    rows, columns = around(candidate.x, candidate.y, half, half, half, half).window(*skin.shape)
+    rows, columns = around(candidate.x, candidate.y, half, half, half, half).scaled(COARSE).window(*skin.shape)
     return float(skin[rows, columns].mean()) / 255 if skin[rows, columns].size else 0.0

@@ -91,6 +91,12 @@ def cut_hand(
     return Hand(hand, x0, y0, int(area), centroid, (x0 + tip[0] / factor, y0 + tip[1] / factor), whole / factor)
 
 
+def thickness(mask: Mask) -> float:
+    """Diameter in pixels of the largest circle inside a mask."""
+    distance = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)
+    return 2 * float(distance.max()) - 1
+
+
 def outline(hand: Hand) -> NDArray[np.int32]:
     """Outer contour (N, 2) x, y of the largest part, every border pixel, in pixels of the picture."""
     contours, _ = cv2.findContours(hand.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(hand.x0, hand.y0))

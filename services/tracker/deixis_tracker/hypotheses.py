@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 Points = NDArray[np.float32]
 Density = NDArray[np.float32]
+Cells = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 CELL = 4  # pixels per cell of a density
 MOST_HYPOTHESES = 256
@@ -39,12 +40,24 @@ def propagate(pixels: Points, dx: float, dy: float, sigma_px: float, height: int
     return np.asarray(cv2.blur(once, (side, side), borderType=cv2.BORDER_CONSTANT), np.float32)
 
 
-def support(density: Density, mask: NDArray[np.uint8], x0: int, y0: int) -> float:
-    """Share of a track's hypotheses that fall on the observed pixels `mask` (a window with its corner at (x0, y0)), 0 to 1."""
-    return float(min(1.0, at_pixels(density, mask, x0, y0).sum() / CELL**2))
-
-
-def at_pixels(density: Density, mask: NDArray[np.uint8], x0: int, y0: int) -> Density:
-    """Density at each pixel of the mask that is set, in row order."""
+def cells_of(mask: NDArray[np.uint8], x0: int, y0: int) -> Cells:
+    """Cells (rows, columns) of a density under the set pixels of a window with its corner at (x0, y0), in row order."""
     rows, columns = np.nonzero(mask)
-    return density[(rows + y0) // CELL, (columns + x0) // CELL]
+    return (rows + y0) // CELL, (columns + x0) // CELL
+
+
+def support(density: Density, cells: Cells) -> float:
+    """Share of a track's hypotheses that fall on the observed pixels, 0 to 1."""
+    return float(min(1.0, density[cells].sum() / CELL**2))
+
+
+def best_tracks(supports: NDArray[np.float64], least: float) -> list[list[int]]:
+    """Tracks (rows) that claim each blob (columns): each track the blob that holds most of its hypotheses, `least` or more.
+
+    A track claims one blob only: one that claimed all it touches was pulled onto the other arm when its own was torn in two.
+    """
+    claims: list[list[int]] = [[] for _ in range(supports.shape[1])]
+    for track, row in enumerate(supports):
+        if len(row) and row.max() >= least:
+            claims[int(np.argmax(row))].append(track)
+    return claims

@@ -43,6 +43,17 @@ class PointFilter:
         pp, pv, vv = self._pp, self._pv, self._vv
         self._pp, self._pv, self._vv = (1 - gain_p) * pp, (1 - gain_p) * pv, vv - gain_v * pv
 
+    def limit(self, speed_px_s: float) -> None:
+        """Bound the speed: a blob that changed its shape looks like a leap, and would shoot the track off."""
+        speed = math.hypot(self.vx, self.vy)
+        if speed > speed_px_s:
+            self.damp(speed_px_s / speed)
+
+    def restart(self, x: float, y: float, sigma_px: float) -> None:
+        """At rest at (x, y): where a lost point was found again."""
+        self.x, self.y, self.vx, self.vy = x, y, 0.0, 0.0
+        self._pp, self._pv, self._vv = sigma_px**2, 0.0, self._q * 0.04
+
     def damp(self, factor: float) -> None:
         """Slow down: an unseen object is not flown out of the picture by its last speed."""
         self.vx *= factor

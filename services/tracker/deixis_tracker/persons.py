@@ -30,6 +30,13 @@ class HandTrack:
     belief: HandBelief = field(default_factory=HandBelief)
     evidence: float = 0.0
     frames: int = 1
+    on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
+
+    @property
+    def last_seen(self) -> tuple[float, float]:
+        """Middle of the pixels seen last."""
+        x, y = self.pixels.mean(axis=0)
+        return float(x), float(y)
 
 
 @dataclass
@@ -73,7 +80,7 @@ class Person:
     def resting_hands_box(self) -> Box:
         """Where hands hang. Above it a hand is raised, and has come there since the room was learned."""
         w = self.width
-        return Box(self.x - 2.1 * w, self.y + 2.4 * w, 4.2 * w, 3.8 * w)
+        return Box(self.x - 1.7 * w, self.y + 2.4 * w, 3.4 * w, 3.8 * w)
 
     def shoulder(self, x: float) -> tuple[float, float]:
         """The shoulder on the side of the picture where `x` is."""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 Image = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
 
-SHRINK = 4
-LEAST_HEIGHT_PX = 90
+SHRINK = 2  # of the coarse masks
+LEAST_HEIGHT_PX = 45
 LEAST_SLENDERNESS = 1.5  # height over width
 SKIN = 60
 
@@ -30,7 +30,7 @@ class SilhouetteHead(NamedTuple):
 
 
 def find_heads(changed: Mask, skin: Image, people: Mask) -> list[SilhouetteHead]:
-    """Heads on top of changed regions (H, W) outside of `people` (255 where somebody is tracked already)."""
+    """Heads on top of changed regions (H, W), in its pixels, outside of `people` (255 where somebody is tracked already)."""
     size = (changed.shape[1] // SHRINK, changed.shape[0] // SHRINK)
     small = cv2.resize(cv2.bitwise_and(changed, cv2.bitwise_not(people)), size, interpolation=cv2.INTER_AREA)
     solid = cv2.morphologyEx(np.asarray(small > 100, np.uint8), cv2.MORPH_CLOSE, np.ones((5, 3), np.uint8))
