@@ -22,11 +22,11 @@ FOLLOW, FOLLOW_SPEED = 0.2, 0.025
 
 
 class Neck:
-    """Constant-velocity filter (alpha-beta) of the point that the head turns about."""
+    """Constant-velocity filter (alpha-beta) of the point that the head turns about; it starts at a speed in m/s, (3,)."""
 
-    def __init__(self, pose: Pose) -> None:
+    def __init__(self, pose: Pose, speed_m_s: Array | None = None) -> None:
         self._place: Array = pose.position_m - _lever(pose)
-        self._speed: Array = np.zeros(3)
+        self._speed: Array = np.zeros(3) if speed_m_s is None else speed_m_s
 
     def prior(self, start: Pose, dt: float) -> Prior:
         """What is expected of the pose `dt` seconds after the last update, as a step from `start`."""

@@ -21,6 +21,8 @@ from .uncertainty import yaw_sigma_deg
 
 SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
+MOVED_ON_S = 0.3
+"""A head not matched for so long may be anywhere near its track."""
 DOUBT_EVERY = 3
 """The frontal-face detector costs several matchings, so it is asked in every third frame of doubt."""
 STILL_TURN, STILL_SHIFT_M = np.radians(1.0), 0.002
@@ -95,16 +97,23 @@ class TrackedHead:
         if agreed is None:
             return HeadState("initialising")
         pose = frontal_pose(agreed, sight.camera, self._config.haar_width_m, self._config.haar_drop_m)
-        if self._pose is not None and not _same_place(pose, self._pose):
+        unseen_s = (sight.stamp_ns - self._matched_ns) * 1e-9
+        if self._pose is not None and unseen_s < MOVED_ON_S and not _same_place(pose, self._pose):
             return HeadState("initialising")
         levels = self._levels(sight, pose)
         self._keyframes = Keyframes(self._config.keyframe_spacing_deg, self._config.keyframe_limit)
         self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera))
-        self._velocity, self._doubts = np.zeros(6), 0
+        self._doubts, self._gone = 0, None
+        self._velocity = np.concatenate([np.zeros(3), self._walking_speed(sight, pose)])
         self._initialiser = Initialiser(self._config.initial_views)
         self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.stamp_ns
-        self._neck = Neck(pose)
+        self._neck = Neck(pose, self._walking_speed(sight, pose))
         return self._state(held_s=0.0)
+
+    def _walking_speed(self, sight: Sight, pose: Pose) -> Array:
+        """Speed (3,) of the head by its track, m/s: a start in mid-walk, taken for a stand, would be read as a turn."""
+        across, down = sight.face.velocity_px_s
+        return np.array([across, down, 0.0]) * pose.position_m[2] / sight.camera.focal_px
 
     def _contradicted(self, sight: Sight, state: HeadState) -> HeadState | None:
         """Start anew where the head is thought far away or lost and yet frontal faces are seen; else none."""
