@@ -23,6 +23,10 @@ SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
 MOVED_ON_S = 0.3
 """A head not matched for so long may be anywhere near its track."""
+PATIENCE = 15
+"""Frames in which a new head is asked for its frontal face; after these, every third frame, for many never show it."""
+WALKING_M_S = 0.4
+"""Slower heads stand."""
 DOUBT_EVERY = 3
 """The frontal-face detector costs several matchings, so it is asked in every third frame of doubt."""
 STILL_TURN, STILL_SHIFT_M = np.radians(1.0), 0.002
@@ -75,11 +79,14 @@ class TrackedHead:
         self._matched_ns = 0
         self._doubts = 0
         self._gone: Side | None = None
+        self._asked = 0
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
         if self._pose is None or self._neck is None:
-            return self._initialise(sight)
+            self._asked += 1
+            hidden = self._asked > PATIENCE and self._asked % DOUBT_EVERY
+            return HeadState("initialising") if hidden else self._initialise(sight)
         dt = (sight.stamp_ns - self._matched_ns) * 1e-9
         found = self._match(sight, self._pose, self._neck, dt)
         if found is not None:
@@ -111,9 +118,13 @@ class TrackedHead:
         return self._state(held_s=0.0)
 
     def _walking_speed(self, sight: Sight, pose: Pose) -> Array:
-        """Speed (3,) of the head by its track, m/s: a start in mid-walk, taken for a stand, would be read as a turn."""
+        """Speed (3,) of the head by its track, m/s: a start in mid-walk, taken for a stand, would be read as a turn.
+
+        Zero for those who stand: the velocity of a young track is noise, and would be read as a turn as well.
+        """
         across, down = sight.face.velocity_px_s
-        return np.array([across, down, 0.0]) * pose.position_m[2] / sight.camera.focal_px
+        speed = np.asarray(np.array([across, down, 0.0]) * pose.position_m[2] / sight.camera.focal_px, np.float64)
+        return speed if np.linalg.norm(speed) > WALKING_M_S else np.zeros(3)
 
     def _contradicted(self, sight: Sight, state: HeadState) -> HeadState | None:
         """Start anew where the head is thought far away or lost and yet frontal faces are seen; else none."""
