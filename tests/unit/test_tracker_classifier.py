@@ -43,3 +43,8 @@ def test_a_raised_hand_wins_its_label_from_a_patch_that_is_barely_skin():
     hand = watched(Features(-3.0, 1.5, 0.1, 0.35, 1.0, 0.87))
     patch = watched(Features(-1.2, 4.5, 0.0, 0.15, 1.0, 0.6))
     assert label([patch, hand], ["unknown", "unknown"]) == ["unknown", "right_hand"]
+
+
+def test_however_long_a_raised_hand_is_held_across_the_body_its_side_stays():
+    held = watched(HANGING_LEFT, *[Features(-1.8, 0.8, 0.1, 0.3, 1.0, 0.9)] * 20)
+    assert held.probabilities().left_hand > held.probabilities().right_hand

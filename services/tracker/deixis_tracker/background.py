@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
 
 UPDATE_EVERY = 3  # frames
-GRID = 4  # the gain is fitted on every 4th pixel of the coarse picture
+GRID = 6  # the gain is fitted on every 6th pixel of the coarse picture
 UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, changed
 SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07

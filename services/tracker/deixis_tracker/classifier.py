@@ -21,6 +21,7 @@ KINDS: tuple[HandKind, ...] = ("left_hand", "right_hand", "unknown")
 HANGING_BELOW = 2.0  # face widths below the face
 RATE_PER_S = 8.0  # independent observations a second
 MEMORY = 7.0  # most log odds that are kept
+RAISED_SAYS = 2.0  # most log odds that the place of a raised hand gives to its side
 RAISED = 1.2  # what is skin-coloured and stands out from the room high up is likelier a hand
 
 
@@ -66,10 +67,20 @@ class HandBelief:
     def update(self, features: Features, dt_s: float) -> None:
         """Add what one frame says; `dt_s` since the last."""
         weight = min(1.0, RATE_PER_S * dt_s)
-        for kind, value in log_likelihoods(features).items():
+        likelihoods = log_likelihoods(features)
+        if features.dy < HANGING_BELOW:
+            likelihoods = self._little_about_the_side(likelihoods)
+        for kind, value in likelihoods.items():
             self._log[kind] += weight * value
         top = max(self._log.values())
         self._log = {kind: max(value - top, -MEMORY) for kind, value in self._log.items()}
+
+    def _little_about_the_side(self, likelihoods: dict[HandKind, float]) -> dict[HandKind, float]:
+        """Without the sides' difference, once they differ: frame by frame an arm held across the body would change its side."""
+        if abs(self._log["left_hand"] - self._log["right_hand"]) < RAISED_SAYS:
+            return likelihoods
+        either = max(likelihoods["left_hand"], likelihoods["right_hand"])
+        return {**likelihoods, "left_hand": either, "right_hand": either}
 
     def log(self, kind: HandKind) -> float:
         """Log belief in a kind, up to a constant that all kinds of this track share."""

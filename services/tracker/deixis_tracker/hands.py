@@ -7,6 +7,7 @@ the shoulder.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import cv2
@@ -34,20 +35,19 @@ class Hand(NamedTuple):
 
 def geodesic(mask: Mask, seed: tuple[int, int]) -> NDArray[np.float32]:
     """Distance in pixels inside the mask from the `seed` (x, y) to each pixel of the mask; -1 where it does not lead."""
-    distance = np.full(mask.shape, -1, np.float32)
     reached = np.zeros_like(mask)
     reached[seed[1], seed[0]] = 1
-    distance[seed[1], seed[0]] = 0
+    since = np.zeros(mask.shape, np.float32)  # steps since a pixel was reached; counting is cheaper than marking
+    count = 1
     for step in range(1, mask.size):
-        grown = (
-            np.asarray(cv2.dilate(reached, SQUARE if step % 2 else CROSS), np.uint8) & mask
-        )  # alternating: an octagon, nearly a circle
-        fresh = grown > reached
-        if not fresh.any():
+        # Square and cross in turn reach an octagon, nearly a circle.
+        grown = cv2.bitwise_and(cv2.dilate(reached, SQUARE if step % 2 else CROSS), mask)
+        grown_count = cv2.countNonZero(grown)
+        if grown_count == count:
             break
-        distance[fresh] = step
-        reached = grown
-    return distance
+        since += reached
+        reached, count = np.asarray(grown, np.uint8), grown_count
+    return np.where(reached > 0, since.max() - since, -1).astype(np.float32)
 
 
 def cut_hand(
@@ -65,6 +65,8 @@ def cut_hand(
     face widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm
     held up in front of the shoulder has its hand at the near end.
     """
+    if math.hypot(*mask.shape) <= length * face_width_px:
+        return _whole(mask, x0, y0, shoulder)
     factor = min(1.0, CELLS_PER_WIDTH / face_width_px)
     small = mask if factor == 1 else _shrink(mask, factor)
     offset = np.array([x0, y0], float)
@@ -85,10 +87,22 @@ def cut_hand(
     if factor != 1:
         keep = np.asarray(cv2.resize(keep, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
     hand = mask & keep
+    return _measured(hand, x0, y0, (x0 + tip[0] / factor, y0 + tip[1] / factor), whole / factor)
+
+
+def _whole(mask: Mask, x0: int, y0: int, shoulder: tuple[float, float]) -> Hand:
+    """A blob that is no longer than a hand: there is nothing to cut."""
+    rows, columns = np.nonzero(mask)
+    away = np.hypot(columns + x0 - shoulder[0], rows + y0 - shoulder[1])
+    k = int(np.argmax(away))
+    return _measured(mask, x0, y0, (float(x0 + columns[k]), float(y0 + rows[k])), float(away.max() - away.min()))
+
+
+def _measured(hand: Mask, x0: int, y0: int, tip: tuple[float, float], arm_length_px: float) -> Hand:
     moments = cv2.moments(hand, binaryImage=True)
     area = max(1.0, moments["m00"])
     centroid = (x0 + moments["m10"] / area, y0 + moments["m01"] / area)
-    return Hand(hand, x0, y0, int(area), centroid, (x0 + tip[0] / factor, y0 + tip[1] / factor), whole / factor)
+    return Hand(hand, x0, y0, int(area), centroid, tip, arm_length_px)
 
 
 def thickness(mask: Mask) -> float:

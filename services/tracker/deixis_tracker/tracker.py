@@ -49,6 +49,7 @@ LEAST_FRAMES = 3
 WALKER_HITS = 5
 MOST_IN_FRONT = 2.6  # a face on the body of a tracked person is a shirt, unless it is so much larger: somebody in front
 LONGEST_STEP_S = 0.5
+SHOW_LOST_S = 0.2  # a hand is published so long after it was seen last
 
 
 class Tracker:
@@ -407,7 +408,8 @@ class Tracker:
     # --- output -------------------------------------------------------------------------------------------------------
 
     def _tracks(self, person: Person, scale: float) -> list[Track]:
-        hands = [self._hand_track(person, hand, scale) for hand in person.hands if _is_shown(hand)]
+        shown = [hand for hand in person.hands if _is_shown(hand) and self._stamp_ns - hand.seen_ns <= SHOW_LOST_S * 1e9]
+        hands = [self._hand_track(person, hand, scale) for hand in shown]
         return [self._face_track(person, scale), *hands]
 
     def _face_track(self, person: Person, scale: float) -> Track:
