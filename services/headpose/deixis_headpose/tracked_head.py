@@ -150,7 +150,9 @@ class TrackedHead:
                 return found
         starts = [last, last.moved(step), last.moved(1.6 * step)]
         found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
-        if found.correlation >= self._config.search_gate:
+        # Out there the answer is the same for any yaw, so a believed match is enough.
+        far = abs(found.pose.angles_deg()[0]) > self._config.range_deg
+        if found.correlation >= (self._config.gate if far else self._config.search_gate):
             return found
         starts = [turned(pose, turn) for pose in (last, last.moved(step)) for turn in SEARCH_TURNS_DEG]
         other = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
