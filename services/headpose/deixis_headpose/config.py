@@ -41,7 +41,7 @@ class HeadposeConfig(BaseModel):
     range_deg: float = Field(default=100.0, gt=30, le=150, description="Yaw beyond which the head is out of range, degrees.")
     turned_deg: float = Field(default=45.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
     doubt_deg: float = Field(
-        default=60.0, gt=20, le=120, description="Beyond this yaw, and where lost, a frontal face that is seen starts it anew."
+        default=80.0, gt=20, le=120, description="Beyond this yaw, and where lost, a frontal face that is seen starts it anew."
     )
     hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
