@@ -23,18 +23,26 @@ def holds(box, point):
     return box[0] <= point[0] <= box[0] + box[2] and box[1] <= point[1] <= box[1] + box[3]
 
 
-def test_face_and_pointing_hand_of_a_clip_are_found(rendered):
-    truth = json.loads((rendered / "k08_point_m100_gain80.json").read_text())["frames"]
+@pytest.mark.parametrize(
+    ("name", "side"),
+    [
+        ("k08_point_m100_gain80", "right"),
+        ("c11_point_p60", "left"),  # a brown sleeve before a picture of an orange flower
+        ("c16_point_m60_small", "right"),  # bare arms, a wooden floor below and behind
+    ],
+)
+def test_face_and_pointing_hand_of_a_clip_are_found(rendered, name, side):
+    truth = json.loads((rendered / f"{name}.json").read_text())["frames"]
     tracker = Tracker(TrackerConfig())
     faces = hands = raised = 0
-    for index, image in frames_of(rendered / "k08_point_m100_gain80.mp4", count=76):
+    for index, image in frames_of(rendered / f"{name}.mp4", count=76):
         tracks = tracker.update(image, index * PERIOD_NS)
         person = truth[index]["persons"][0]
         faces += any(t.kind == "face" and holds(person["face"]["bbox_visible"], t.centroid_px) for t in tracks)
         if person["phase"] == "stroke":
             raised += 1
-            centre = np.array(person["hands"]["right"]["centroid_visible_px"])
-            hands += any(t.kind == "right_hand" and np.hypot(*(centre - t.centroid_px)) < 15 for t in tracks)
+            centre = np.array(person["hands"][side]["centroid_visible_px"])
+            hands += any(t.kind == f"{side}_hand" and np.hypot(*(centre - t.centroid_px)) < 15 for t in tracks)
     assert faces >= 0.95 * 76
     assert raised > 10
     assert hands >= 0.9 * raised

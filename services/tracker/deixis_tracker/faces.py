@@ -8,6 +8,7 @@ hits land on shirts and furniture, so a face is believed after several hits in s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import cv2
@@ -21,7 +22,8 @@ from deixis_tracker.config import TrackerConfig
 
 Image = NDArray[np.uint8]
 
-WINDOW_PX = 20  # of the cascade haarcascade_frontalface_alt2
+FRONTAL = "haarcascade_frontalface_alt2"
+WINDOW_PX = 20  # of that cascade
 SCALE_STEP = 1.17
 VERIFY_PX = 32  # a face that is looked at again is scaled to this width
 MISSES_ALLOWED = 3
@@ -50,6 +52,7 @@ class Candidate:
     skin: float = 0.0
 
 
+@cache
 def load_cascade(name: str) -> cv2.CascadeClassifier:
     """A cascade that OpenCV ships. Raises RuntimeError where this build has none (5.x wheels)."""
     cascade = cv2.CascadeClassifier(f"{cv2.data.haarcascades}{name}.xml")
@@ -83,7 +86,7 @@ class FaceDetector:
 
     def __init__(self, height: int, width: int, config: TrackerConfig) -> None:
         """For pictures of one size."""
-        self._frontal = load_cascade("haarcascade_frontalface_alt2")
+        self._frontal = load_cascade(FRONTAL)
         self._config = config
         self._jobs = plan_jobs(height, width, config)
         self._next = 0

@@ -8,6 +8,8 @@ of the brightness as a weak third axis. The densities of skin and of everything 
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +42,7 @@ def gaussian_densities(x: Array, mean: Array, covariance: Array) -> Array:
     """Densities of a Gaussian at (N, D) points."""
     offset = x - mean
     inverse = np.linalg.inv(covariance)
-    distance = np.einsum("ni,ij,nj->n", offset, inverse, offset)
+    distance = ((offset @ inverse) * offset).sum(axis=1)
     norm = np.sqrt((2 * np.pi) ** x.shape[1] * np.linalg.det(covariance))
     return np.asarray(np.exp(-0.5 * distance) / norm, np.float64)
 
@@ -63,25 +65,32 @@ def _overexposed_skin(bgr: Array) -> NDArray[np.bool_]:
     return np.asarray((r > 244) & (g > 180) & (b > 140) & (r > b) & (g >= b), np.bool_)
 
 
+@cache
+def _prior_densities() -> tuple[Array, Array, Array]:
+    """(features, density of skin, density of everything else) of each colour of the table; the same for every model."""
+    features = chroma_features(_table_colours())
+    return features, _mixture(features, SKIN), _mixture(features, OTHER)
+
+
 class SkinModel:
     """P(skin | colour) as a table. `adapt_person` and `adapt_room` change it; `probability` applies it."""
 
     def __init__(self, prior_skin: float) -> None:
         """`prior_skin`: share of skin among the pixels looked at, 0 to 1 (exclusive)."""
         self._prior = prior_skin
-        self._features = chroma_features(_table_colours())
-        self._skin_prior = _mixture(self._features, SKIN)
-        self._other_prior = _mixture(self._features, OTHER)
+        self._features, self._skin_prior, self._other_prior = _prior_densities()
         self._volume = self._cell_volume()
         self._person: dict[int, tuple[Array, Array]] = {}
         self._person_density: dict[int, Array] = {}
         self._room: Array | None = None
         self._clothes: dict[int, Array] = {}
         self._overexposed = _overexposed_skin(_table_colours())
-        self._table = self._posterior()
+        self._table: Image | None = None
 
     def probability(self, image: Image) -> Image:
         """P(skin) of each pixel of an (H, W, 3) BGR image as (H, W) uint8, 255 = certain."""
+        if self._table is None:  # several densities may have changed since: one table for all of them
+            self._table = self._posterior()
         return look_up(self._table, image)
 
     def adapt_person(self, person_id: int, pixels: NDArray[np.uint8], rate: float) -> None:
@@ -101,7 +110,7 @@ class SkinModel:
             covariance = old_covariance + rate * (covariance - old_covariance)
         self._person[person_id] = mean, covariance
         self._person_density[person_id] = gaussian_densities(self._features, mean, covariance + SPREAD_FLOOR)
-        self._table = self._posterior()
+        self._table = None
 
     def adapt_room(self, image: Image, room: Mask) -> None:
         """Learn the colours of the room, where `room` (H, W) is not 0: what is no skin here."""
@@ -109,7 +118,7 @@ class SkinModel:
         if density is None:
             return
         self._room = density if self._room is None else 0.7 * self._room + 0.3 * density
-        self._table = self._posterior()
+        self._table = None
 
     def adapt_clothes(self, person_id: int, torso: Image) -> None:
         """Learn the colours of a person's clothes from a piece of the picture (H, W, 3): a brown shirt is nearly skin."""
@@ -118,7 +127,7 @@ class SkinModel:
             return
         known = self._clothes.get(person_id)
         self._clothes[person_id] = density if known is None else 0.7 * known + 0.3 * density
-        self._table = self._posterior()
+        self._table = None
 
     def _density_of(self, image: Image, mask: Mask | None) -> Array | None:
         if image.size == 0:
@@ -133,7 +142,7 @@ class SkinModel:
         self._person.pop(person_id, None)
         self._clothes.pop(person_id, None)
         if self._person_density.pop(person_id, None) is not None:
-            self._table = self._posterior()
+            self._table = None
 
     def _posterior(self) -> Image:
         skin, other = self._skin_prior, self._other_prior

@@ -18,7 +18,7 @@ from deixis_tracker.boxes import around
 from deixis_tracker.classifier import Features, HandBelief, label
 from deixis_tracker.coarse import COARSE, coarsened
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.faces import Candidate, FaceDetector
+from deixis_tracker.faces import FRONTAL, Candidate, FaceDetector, load_cascade
 from deixis_tracker.hands import Hand, cut_hand, outline, thickness
 from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder
 from deixis_tracker.hypotheses import Cells, best_tracks, cells_of, propagate, sample_pixels, support
@@ -57,6 +57,8 @@ class Tracker:
 
     def __init__(self, config: TrackerConfig) -> None:
         self._config = config
+        load_cascade(FRONTAL)  # now, not within the first frame
+        SkinModel(config.prior_skin)
         self._shape: tuple[int, int] | None = None
         self._ids = 0
         self._person_ids = 0
