@@ -1,6 +1,9 @@
 # `make demo` and `make test` build .venv where it is missing, so each works alone on a machine with Python 3.11 and make.
 PYTHON ?= python3.11
 SOURCE ?=
+SITE ?=
+export DEMO_SOURCE = $(value SOURCE)
+export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
 DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
@@ -23,7 +26,8 @@ ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
 		--registry $$registry --expect P3; status=$$?; rm -f $$registry*; exit $$status
 else
-	@$(BIN)/deixis run $(SOURCE) $(if $(SITE),--site $(SITE))
+	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
+	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run "$$@"
 endif
 
 test: setup check

@@ -47,7 +47,7 @@ def run_list(given: argparse.Namespace) -> int:
 
 def run_add(given: argparse.Namespace) -> int:
     """Add or replace one POI."""
-    poi = _checked(poi_id=given.poi_id, name=given.name, position_m=given.position_m, extent_m=given.extent, tags=given.tag)
+    poi = _checked(poi_id=given.poi_id, name=given.name, position_m=_position(given), extent_m=given.extent, tags=given.tag)
     with open_client(given.connect, shared_memory=False) as session:
         _show([_edit(session, given, poi.poi_id, poi)], given)
     return 0
@@ -59,7 +59,7 @@ def run_move(given: argparse.Namespace) -> int:
         found = {poi.poi_id: poi for poi in _all_pois(session, given)}
         if given.poi_id not in found:
             raise CommandError(f"poi_id: there is no POI '{given.poi_id}'; use 'deixis poi add'")
-        poi = _checked(**{**found[given.poi_id].model_dump(), "position_m": given.position_m})
+        poi = _checked(**{**found[given.poi_id].model_dump(), "position_m": _position(given)})
         _show([_edit(session, given, poi.poi_id, poi)], given)
     return 0
 
@@ -151,6 +151,11 @@ def _action(actions: Any, name: str, text: str, run: Any) -> argparse.ArgumentPa
     return parser
 
 
+def _position(given: argparse.Namespace) -> tuple[float, float, float]:
+    return given.x_m, given.y_m, given.z_m
+
+
 def _place(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("poi_id", metavar="ID", type=poi_id)
-    parser.add_argument("position_m", type=float, nargs=3, metavar=("X", "Y", "Z"), help="in the map frame, metres")
+    for axis in ("x_m", "y_m", "z_m"):
+        parser.add_argument(axis, type=float, metavar=axis[0].upper(), help="in the map frame, metres")

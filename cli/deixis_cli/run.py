@@ -24,6 +24,9 @@ from .source import Source, read_source
 EXPECTED_MISSED = 1
 
 
+ENOUGH_ANSWERED = 0.8
+
+
 def register(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
@@ -92,6 +95,13 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
     played = f"\n{result.frames} frames in {result.wall_s:.1f} s, {counts.get('Belief', 0)} answered"
     rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
     console.out(f"{played}{rejected}.", highlight=False)
+    share = counts.get("Belief", 0) / result.frames
+    if share < ENOUGH_ANSWERED:
+        console.out(
+            f"Only {share:.0%} of the frames were answered: this machine is too slow or too busy for the source's rate. "
+            "Free it, lower the rate (--set camera.rate_hz=15), or play recordings with --lockstep.",
+            highlight=False,
+        )
 
 
 def document(robot: str, source: str, result: PlayResult) -> dict[str, Any]:

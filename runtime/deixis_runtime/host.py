@@ -18,6 +18,7 @@ import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health
 
+from .router import SOCKET_FOLDER_PREFIX
 from .session import DEFAULT_ENDPOINT, open_client
 from .supervisor import Supervisor
 
@@ -83,7 +84,7 @@ class Host:
 
     def __enter__(self) -> Self:
         # A socket's path is limited to about 100 bytes, so not below the user's working directory.
-        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="deixis-")))
+        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=SOCKET_FOLDER_PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
         self._stack.callback(self.supervisor.stop)
         return self
@@ -121,6 +122,8 @@ class Host:
             beat = self._beats.get(process.popen.pid) if process.popen else None
             if beat and process.running and now - beat[1] > HANGS_AFTER_S:
                 self.supervisor.kill(process.name, f"gives no heartbeat for {HANGS_AFTER_S:.0f} s")
+            elif not beat and process.name != "router" and process.running and now - process.spawned_s > READY_TIMEOUT_S:
+                self.supervisor.kill(process.name, f"gave no heartbeat within {READY_TIMEOUT_S:.0f} s of its start")
         failed = self.supervisor.failed()
         if failed:
             raise HostFailed("; ".join(f"{name} is given up: {why}" for name, why in failed.items()))

@@ -9,6 +9,7 @@ import argparse
 import json
 import logging
 import os
+import shutil
 import signal
 import threading
 from pathlib import Path
@@ -21,6 +22,7 @@ from .stage import EXIT_UNREACHABLE, setup_logging
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
 CHECK_S = 1.0
+SOCKET_FOLDER_PREFIX = "deixis-"
 
 log = logging.getLogger("deixis-router")
 
@@ -67,23 +69,34 @@ def main(argv: list[str] | None = None) -> int:
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
-    _watch_links(session, given.connect, stop, parent)
+    _watch_links(session, given.listen, given.connect, stop, parent)
     close(session)
     exit_now(0)
     return 0
 
 
-def _watch_links(session: zenoh.Session, connect: list[str], stop: threading.Event, parent: int | None) -> None:
+def _watch_links(
+    session: zenoh.Session, listen: list[str], connect: list[str], stop: threading.Event, parent: int | None
+) -> None:
     linked: bool | None = None
     while not stop.wait(CHECK_S):
         if parent is not None and os.getppid() != parent:
             log.error("the supervisor is gone; stopping")
+            _remove_socket_folders(listen)
             return
         now = bool(session.info.routers_zid())
         if connect and now != linked:
             level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
             log.log(level, text, ", ".join(connect))
         linked = now
+
+
+def _remove_socket_folders(listen: list[str]) -> None:
+    """The temporary folder of a supervisor that was killed: nobody else is left to remove it."""
+    for endpoint in listen:
+        folder = Path(endpoint.removeprefix("unixsock-stream/")).parent
+        if endpoint.startswith("unixsock-stream/") and folder.name.startswith(SOCKET_FOLDER_PREFIX):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _endpoints(value: object) -> list[str]:

@@ -32,6 +32,7 @@ class Process:
     argv: list[str]
     popen: subprocess.Popen[bytes] | None = None
     restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
+    spawned_s: float = 0.0
     start_again_s: float | None = None
     given_up: str = ""
 
@@ -96,6 +97,7 @@ class Supervisor:
 
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
+        process.spawned_s = time.monotonic()
         process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True)
 
     def _plan_restart(self, process: Process) -> None:

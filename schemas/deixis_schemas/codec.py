@@ -104,7 +104,7 @@ def say(error: ValidationError) -> str:
     lines = []
     for item in error.errors(include_url=False, include_input=False)[:3]:
         field = ".".join(str(part) for part in item["loc"])
-        text = item["msg"].removeprefix("Value error, ")
+        text = "unknown key" if item["type"] == "extra_forbidden" else item["msg"].removeprefix("Value error, ")
         lines.append(f"{field}: {text}" if field else text)
     more = error.error_count() - len(lines)
     return "; ".join(lines) + (f"; and {more} more" if more > 0 else "")

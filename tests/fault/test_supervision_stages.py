@@ -152,7 +152,7 @@ def test_a_killed_router_is_started_again_and_its_stages_come_back(lasting_up):
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        ("fusion.no_such_setting=1", "no_such_setting: Extra inputs are not permitted"),
+        ("fusion.no_such_setting=1", "no_such_setting: unknown key"),
         ("camera.quality=1000", "settings of camera: quality"),
         ("camera.source", "not of the form STAGE.NAME=VALUE"),
     ],
