@@ -99,6 +99,18 @@ def test_a_fist_that_was_there_when_the_person_came_is_no_pointing():
     assert set(gestures) <= {"none", "other"}
 
 
+def test_two_hands_held_up_together_are_no_pointing():
+    def both(time_s, second):
+        return [_face(), _hand(_place(time_s), POINT), _hand(second, (), track_id=2, kind="left_hand")]
+
+    def joined(time_s):
+        x, y = _place(time_s)
+        return both(time_s, (x + 1.5, y))
+
+    assert {g.gesture for g in _settled(_played(joined))} == {"other"}
+    assert {g.gesture for g in _settled(_played(lambda t: both(t, (1.2, 4.3))))} == {"point_right"}
+
+
 def test_two_runs_on_the_same_tracks_are_equal():
     assert _played(_pointing) == _played(_pointing)
 

@@ -13,7 +13,7 @@ from .config import GestureConfig
 from .fingertips import Finger, find_fingers
 from .hand import CHEST, Face, HandShape, cut_hand, unpack_contour
 from .phases import PhaseTracker
-from .rules import StrokeGesture, vote
+from .rules import StrokeGesture, Vote, vote
 
 # Weight of a new frame in the average of which side's hand it is.
 SIDE_RATE = 0.15
@@ -78,8 +78,8 @@ class Arm:
         """How far a track is from where this hand was seen last, pixels."""
         return math.dist(self._place_px, track.centroid_px)
 
-    def update(self, track: Track, face: Face, time_s: float, walking: bool) -> None:
-        """Advance by an observed blob of this hand."""
+    def update(self, track: Track, face: Face, time_s: float, *, walking: bool, joined: bool) -> None:
+        """Advance by an observed blob of this hand; `joined`: the other hand is held up beside it."""
         self.track_id, self.seen_s, self._place_px = track.track_id, time_s, track.centroid_px
         self._first_s = time_s if self._first_s is None else self._first_s
         self._weigh_side(track)
@@ -93,7 +93,8 @@ class Arm:
             self._stroke = StrokeGesture(self._config.settle_s)
             self._measures.clear()
         elif hand:
-            self._stroke.add(time_s, vote(hand, self.fingers), self._was_raised_before_us())
+            seen: Vote = "other" if joined else vote(hand, self.fingers)
+            self._stroke.add(time_s, seen, self._was_raised_before_us())
             self._measures.append((hand.tip[0], self.fingers[0].length if self.fingers else 0.0, hand.palm_radius))
 
     def _was_raised_before_us(self) -> bool:

@@ -32,6 +32,9 @@ class GestureConfig(BaseModel):
     beside_body: float = Field(
         default=2.3, ge=0, le=6, description="Sideways from the face's centre, a hand is off the body, fw."
     )
+    hands_together: float = Field(
+        default=2.0, ge=0, le=10, description="Two raised hands nearer to each other make a gesture together, no pointing, fw."
+    )
     settle_s: float = Field(default=0.3, ge=0, le=2, description="A stroke lasts this long before its gesture is said.")
     forget_s: float = Field(default=0.4, gt=0, le=5, description="A hand or a face unseen for longer is forgotten.")
     walking_speed: float = Field(default=2.0, gt=0, le=40, description="A person whose face is faster than this walks, fw/s.")

@@ -50,7 +50,8 @@ class Person:
         walking = self._face_speed > self._config.walking_speed
         hands = [track for track in tracks if track.kind != "face" and track.observed and track.contour]
         for arm, track in self._assigned(hands, SAME_HAND * self._face.width_px):
-            arm.update(track, self._face, time_s, walking)
+            joined = _is_joined(track, hands, self._face, self._config)
+            arm.update(track, self._face, time_s, walking=walking, joined=joined)
         self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
         self._current = self._gesturing()
         return self._spoken(self._current, self._face, width)
@@ -118,6 +119,16 @@ class Person:
             bearing_sigma_deg=bearing.sigma_deg if bearing else None,
             bearing_mirrored=bearing.mirrored if bearing else False,
         )
+
+
+def _is_joined(track: Track, hands: Sequence[Track], face: Face, config: GestureConfig) -> bool:
+    """Another hand is held up near this one: signers, claps and explaining hands; a pointing is made with one hand."""
+    near_px = config.hands_together * face.width_px
+    lowest_px = face.y_px + config.raised_below_face * face.width_px
+    return any(
+        other is not track and other.centroid_px[1] <= lowest_px and math.dist(other.centroid_px, track.centroid_px) <= near_px
+        for other in hands
+    )
 
 
 def _bearing(arm: Arm, distance: float) -> Bearing | None:
