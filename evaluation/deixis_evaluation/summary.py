@@ -12,7 +12,6 @@ from .blob_scores import BlobScores
 from .clip_score import ClipScore, DistanceScore
 from .yaw_scores import BANDS, YawBand
 
-OUTCOMES = ("named", "in_set", "missed", "wrong")
 SIDES = ("right", "wrong", "missed")
 
 

@@ -20,10 +20,6 @@ BACKOFF_MAX_S = 8.0
 STOP_TIMEOUT_S = 4.0
 
 
-class ProcessFailed(RuntimeError):
-    """A process that will not do its work: bad settings, or restarted too often."""
-
-
 @dataclass
 class Process:
     """One child: its command and how it has fared."""

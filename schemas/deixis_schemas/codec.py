@@ -67,15 +67,20 @@ def unpack(payload: bytes, *, max_bytes: int = 1 << 20) -> dict[str, Any]:
 
 def decode_json(type_: type[T], text: bytes | str) -> T:
     """Read a message from JSON, as generic clients send it. Raises Malformed."""
-    if len(text) > MAX_JSON_BYTES:
-        raise Malformed(f"{len(text)} bytes, more than the {MAX_JSON_BYTES} allowed")
+    return validate(type_, parse_json(text))
+
+
+def parse_json(text: bytes | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any]:
+    """The JSON object in `text`, not validated. Raises Malformed."""
+    if len(text) > max_bytes:
+        raise Malformed(f"{len(text)} bytes, more than the {max_bytes} allowed")
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise Malformed(f"not JSON: {error}") from None
     if not isinstance(content, dict):
         raise Malformed(f"not an object but {type(content).__name__}")
-    return validate(type_, content)
+    return content
 
 
 def encode_json(message: Message) -> bytes:

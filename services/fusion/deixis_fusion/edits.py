@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from deixis_schemas.codec import MSGPACK, CodecError, WrongType, WrongVersion, unpack, validate
+from deixis_schemas.codec import MSGPACK, CodecError, Malformed, WrongType, WrongVersion, parse_json, unpack, validate
 from deixis_schemas.messages import Poi
 
 MAX_BYTES = 64 << 10
@@ -45,10 +44,13 @@ def _content(payload: bytes, encoding: str) -> dict[str, Any]:
     base, _, schema = encoding.partition(";")
     if base == MSGPACK:
         _check_schema(schema)
-        return unpack(payload, max_bytes=MAX_BYTES)
-    if base not in JSON_LABELS:
+    elif base not in JSON_LABELS:
         raise WrongType(f"encoding: '{encoding[:80]}' is neither {MSGPACK};Poi/{Poi.VERSION} nor application/json")
-    return _json(payload)
+    read = unpack if base == MSGPACK else parse_json
+    try:
+        return read(payload, max_bytes=MAX_BYTES)
+    except Malformed as error:
+        raise EditError(f"payload: {error}") from None
 
 
 def _check_schema(schema: str) -> None:
@@ -57,18 +59,6 @@ def _check_schema(schema: str) -> None:
         raise WrongType(f"encoding: '{schema[:80]}', expected 'Poi/{Poi.VERSION}'")
     if version != str(Poi.VERSION):
         raise WrongVersion(f"encoding: Poi version '{version[:20]}', this reader speaks {Poi.VERSION}")
-
-
-def _json(payload: bytes) -> dict[str, Any]:
-    if len(payload) > MAX_BYTES:
-        raise EditError(f"payload: {len(payload)} bytes, more than the {MAX_BYTES} allowed")
-    try:
-        content = json.loads(payload)
-    except (ValueError, RecursionError) as error:
-        raise EditError(f"payload: not JSON: {error}") from None
-    if not isinstance(content, dict):
-        raise EditError(f"payload: not an object but {type(content).__name__}")
-    return content
 
 
 def matches(expression: str, key: str) -> bool:

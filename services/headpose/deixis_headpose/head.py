@@ -46,10 +46,6 @@ class Pose:
         turn, _ = cv2.Rodrigues(self.rotation @ other.rotation.T)
         return np.concatenate([turn.ravel(), self.position_m - other.position_m])
 
-    def angle_to(self, other: Pose) -> float:
-        """Angle of the rotation between the two poses as each is seen from the camera, degrees."""
-        return angle_between(self.seen(), other.seen())
-
     def seen(self) -> Array:
         """Rotation (3, 3) relative to the line head -> camera; identity for a head that looks into the camera."""
         return facing_camera(self.position_m).T @ self.rotation

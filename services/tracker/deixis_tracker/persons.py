@@ -49,7 +49,6 @@ class Person:
     width: float
     colours: HeadColours
     seen_ns: int
-    frontal_ns: int
     support: float = 1.0
     observed: bool = True
     frontal: bool = True

@@ -150,7 +150,7 @@ class Tracker:
         if seen is None:
             return
         person.frontal_hits += 1
-        person.frontal_ns = person.seen_ns = now_ns
+        person.seen_ns = now_ns
         person.observed = True
         person.width += max(0.06, 1 / person.frontal_hits) * (WIDTH_OF_HAAR * seen.w - person.width)
         x, y = seen.centre
@@ -236,7 +236,7 @@ class Tracker:
     def _add_person(self, face: Candidate, views: Views, now_ns: int) -> None:
         width = WIDTH_OF_HAAR * face.width
         motion = PointFilter(face.x, face.y + HEAD_CENTRE_BELOW_HAAR * width, 0.1 * width, HEAD_ACCELERATION * width)
-        person = Person(self._person_ids, self._ids, motion, width, HeadColours(), now_ns, now_ns)
+        person = Person(self._person_ids, self._ids, motion, width, HeadColours(), now_ns)
         self._person_ids += 1
         self._ids += 1
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
