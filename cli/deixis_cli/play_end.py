@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Message, OfFrame
+from deixis_schemas.messages import CameraInfo, FrameId, Message, OfFrame
 from deixis_schemas.topics import By, Topic
 
 # A stage works on the newest frame, so the last one is answered soon, unless the stage is ill or its answer was lost.
@@ -17,8 +17,8 @@ class PlayEnd:
 
     def __init__(self, stages: Sequence[str]) -> None:
         self.camera: CameraInfo | None = None
-        self._awaited = [topic for topic in topics.TOPICS if topic.by is By.FRAME and topic.path.split("/")[0] in stages]
-        self._answered: dict[str, int] = {}
+        self._awaited = [topic for topic in topics.TOPICS if topic.by is By.FRAME and topic.stage in stages]
+        self._answered: dict[str, FrameId] = {}
         self._ended_s: float | None = None
 
     def hear(self, topic: Topic, message: Message | None, now_s: float) -> None:
@@ -26,7 +26,7 @@ class PlayEnd:
         if isinstance(message, CameraInfo):
             self._hear_camera(message, now_s)
         elif isinstance(message, OfFrame):
-            self._answered[topic.path] = message.seq
+            self._answered[topic.path] = message.frame_id
 
     def failure(self) -> str | None:
         """Why the source will not deliver at all; none while it may."""
@@ -40,8 +40,10 @@ class PlayEnd:
 
     def unanswered(self) -> list[str]:
         """Topics on which the last frame is not answered."""
-        last = self.camera.last_seq if self.camera else -1
-        return [topic.path for topic in self._awaited if self._answered.get(topic.path, -1) != last]
+        if self.camera is None or self.camera.last_seq < 0:
+            return [topic.path for topic in self._awaited if topic.path in self._answered]
+        last = FrameId(self.camera.run, self.camera.last_seq)
+        return [topic.path for topic in self._awaited if self._answered.get(topic.path) != last]
 
     def _hear_camera(self, info: CameraInfo, now_s: float) -> None:
         if info.state != "ended":

@@ -29,6 +29,7 @@ class Summary:
         self.target: Target | None = None
         self.clip_s = 0.0
         self.seq = -1
+        self._run = -1
         self._first_ns: int | None = None
         self._frames = 0
         self._timed = 0
@@ -86,8 +87,8 @@ class Summary:
         self._keep_time(frame)
 
     def _keep_time(self, message: OfFrame) -> None:
-        if self._first_ns is None or message.stamp_ns < self._first_ns:
-            self._first_ns, self._since = message.stamp_ns, None
+        if self._first_ns is None or message.run != self._run:
+            self._run, self._first_ns, self._since = message.run, message.stamp_ns, None
         self.seq = message.seq
         self.clip_s = (message.stamp_ns - self._first_ns) / 1e9
         self._timed += 1

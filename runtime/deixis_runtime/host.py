@@ -28,7 +28,6 @@ READY_TIMEOUT_S = 30.0
 POLL_S = 0.05
 HANGS_AFTER_S = 6.0
 BLIND_AFTER_S = 3.0
-LOCKSTEP_INSTANCE = "lockstep"
 
 
 class HostFailed(RuntimeError):
@@ -155,8 +154,7 @@ class Host:
         if self.options.site:
             command += ["--site", str(self.options.site)]
         if self.options.lockstep:
-            # Named alike in every run: two lockstep runs give equal outputs.
-            command += ["--lockstep", "--instance", LOCKSTEP_INSTANCE]
+            command.append("--lockstep")
         for item in self.options.sets.get(name, ()):
             command += ["--set", item]
         return command

@@ -12,27 +12,42 @@ from typing import Any, TypeVar
 
 import yaml
 from deixis_schemas.codec import say
-from pydantic import BaseModel, ValidationError
+from deixis_schemas.messages import NAME_PATTERN
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from .session import DEFAULT_ENDPOINT
 from .site import Site, SiteError, load_site
 
-C = TypeVar("C", bound=BaseModel)
+STARTED_BEFORE = "DEIXIS_STARTED_BEFORE"
+"""Environment variable by which the supervisor tells a child how often it was started before."""
 
 
 class ConfigError(ValueError):
     """Settings that cannot be used; the text names the field and where it was set."""
 
 
+class StageConfig(BaseModel):
+    """Base of every stage's settings, and of their groups: a misspelt name is an error, a value does not change later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+C = TypeVar("C", bound=StageConfig)
+
+
 @dataclass(frozen=True)
 class CommonOptions:
-    """What every stage is told on its command line."""
+    """What every stage is told on its command line.
+
+    started_before: how often its supervisor has started it before: 0 for the first process.
+    """
 
     robot: str
     instance: str
     connect: str
     lockstep: bool
     supervised: bool
+    started_before: int
     site: Site | None
     sets: tuple[str, ...]
 
@@ -48,16 +63,18 @@ def parse_options(stage: str, description: str, argv: list[str] | None) -> Commo
     parser.add_argument("--lockstep", action="store_true", help="time is that of the frames; for reproducible runs")
     parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
     given = parser.parse_args(argv)
+    before = int(os.environ.get(STARTED_BEFORE, "0"))
     try:
         site = load_site(given.site) if given.site else None
     except SiteError as error:
         raise ConfigError(str(error)) from None
     return CommonOptions(
         robot=given.robot,
-        instance=given.instance or default_instance(),
+        instance=given.instance or (lockstep_instance(before) if given.lockstep else default_instance()),
         connect=given.connect,
         lockstep=given.lockstep,
         supervised=given.supervised,
+        started_before=before,
         site=site,
         sets=tuple(given.sets),
     )
@@ -83,9 +100,16 @@ def load_config(stage: str, model: type[C], options: CommonOptions) -> C:
 
 def robot_name(text: str) -> str:
     """A robot's name, checked: it becomes one part of every key. Raises argparse.ArgumentTypeError."""
-    if not re.fullmatch(r"[A-Za-z0-9_.\-]{1,64}", text):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a name of letters, digits, '_', '.' and '-'")
+    if not re.fullmatch(NAME_PATTERN, text):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a name of letters, digits, '_', '.' and '-', beginning with one of the first"
+        )
     return text
+
+
+def lockstep_instance(started_before: int) -> str:
+    """Name of a process in lockstep: alike in every run, so that two runs give equal outputs."""
+    return f"lockstep-{started_before}" if started_before else "lockstep"
 
 
 def default_instance() -> str:

@@ -16,7 +16,6 @@ import zenoh
 from deixis_schemas import topics
 from deixis_schemas.messages import HealthState, Message, Producer
 from deixis_schemas.topics import Topic
-from pydantic import BaseModel
 
 from .heartbeat import Heartbeat
 from .inputs import Subscription
@@ -24,9 +23,9 @@ from .limit import RateLimit
 from .outputs import Publisher
 from .queries import Answer, EditQueue, Query, QueryQueue
 from .session import Unreachable, exit_now, first_line, open_client
-from .settings import CommonOptions, ConfigError, load_config, parse_options
+from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
 
-C = TypeVar("C", bound=BaseModel)
+C = TypeVar("C", bound=StageConfig)
 
 EXIT_CONFIG = 78
 EXIT_UNREACHABLE = 69
@@ -42,6 +41,7 @@ class Node:
         self.robot = options.robot
         self.site = options.site
         self.lockstep = options.lockstep
+        self.started_before = options.started_before
         self.log = logging.getLogger(f"deixis-{stage}")
         self.stopping = False
         self._session = session

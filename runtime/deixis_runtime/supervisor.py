@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import subprocess
 import time
 from collections import deque
 from dataclasses import dataclass, field
 
+from .settings import STARTED_BEFORE
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE
 
 log = logging.getLogger("deixis-supervisor")
@@ -29,6 +31,7 @@ class Process:
     popen: subprocess.Popen[bytes] | None = None
     restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
     spawned_s: float = 0.0
+    started: int = 0
     start_again_s: float | None = None
     given_up: str = ""
 
@@ -94,7 +97,9 @@ class Supervisor:
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
         process.spawned_s = time.monotonic()
-        process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True)
+        environment = {**os.environ, STARTED_BEFORE: str(process.started)}
+        process.started += 1
+        process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
 
     def _plan_restart(self, process: Process) -> None:
         assert process.popen is not None

@@ -42,14 +42,15 @@ def json_schema(type_: type[Message]) -> bytes:
 def topic_table() -> str:
     """The topic table in Markdown."""
     rows = [
-        "| key under `deixis/{robot}/` | type / version | when | delivery | by get | most bytes |",
-        "|---|---|---|---|---|---|",
+        "| key under `deixis/{robot}/` | type / version | when | delivery | by get | most bytes | oldest |",
+        "|---|---|---|---|---|---|---|",
     ]
     for topic in TOPICS:
         rate = f", {topic.rate_hz:g} Hz expected" if topic.rate_hz else ""
+        oldest = f"{topic.max_age_s:g} s" if topic.max_age_s else "-"
         rows.append(
             f"| `{topic.path}` | {topic.type.__name__}/{topic.version} | {topic.by.value}{rate} | {topic.delivery.value} "
-            f"| {'yes' if topic.queryable else 'no'} | {topic.max_bytes} |"
+            f"| {'yes' if topic.queryable else 'no'} | {topic.max_bytes} | {oldest} |"
         )
     return (
         "# Topics\n\nWritten by `python -m deixis_schemas.export`; edit `deixis_schemas/topics.py`.\n\n"

@@ -5,6 +5,8 @@ toward the image's right, that is toward the person's own left (REP-103: counter
 `base_link` and optical frames follow REP-103 and REP-105. Pixel coordinates have their origin at the centre of the top
 left pixel, x right, y down. Times are Unix nanoseconds at the camera's host.
 
+How wide a face is, stands in `anatomy.py`, once for all stages.
+
 A reader ignores fields it does not know; a field that changes its meaning raises the type's `VERSION`.
 """
 
@@ -19,8 +21,11 @@ MAX_PERSONS = 32
 MAX_TRACKS = 96
 MAX_POIS = 1024
 MAX_CONTOUR_BYTES = 65536
+MAX_LISTED = 16
 
-Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.\-]+$")]
+# A name is one part of a key and, of robots, of a path: `.` and `..` are none, and no option begins like one.
+NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]{0,63}$"
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Text = Annotated[str, Field(max_length=2000)]
 Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
@@ -50,6 +55,13 @@ class Producer(NamedTuple):
     instance: str
 
 
+class FrameId(NamedTuple):
+    """Names one frame of one camera."""
+
+    run: int
+    seq: int
+
+
 class Part(BaseModel):
     """A piece of a message; has no version of its own."""
 
@@ -71,24 +83,29 @@ class Produced(Message):
 
 
 class OfFrame(Produced):
-    """A message about one frame. Frames are told apart by `seq` and `stamp_ns` together, for a restarted camera counts anew."""
+    """A message about one frame. `run` and `seq` together name the frame; `stamp_ns` is when it was captured, and no name."""
 
-    seq: Count = Field(description="Number of the frame; of a file, its index from 0.")
+    VERSION: ClassVar[int] = 2
+
+    run: Count = Field(
+        description="Run of the camera that the frame belongs to: within a run `seq` rises. A new one begins with each start "
+        "of the camera and each pass through a recording. Compare for equality only."
+    )
+    seq: Count = Field(description="Number of the frame within its run; of a file, its index from 0.")
 
     @classmethod
     def derive(cls, source: OfFrame, producer: Producer, **content: object) -> Self:
-        """Build the message that `producer` derives from `source`: repeats its `seq` and `stamp_ns`, names the producer.
+        """Build the message that `producer` derives from `source`: repeats `run`, `seq` and `stamp_ns`, names the producer.
 
         Raises pydantic.ValidationError where the content breaks the contract.
         """
-        return cls.model_validate(
-            {**content, "seq": source.seq, "stamp_ns": source.stamp_ns, "stage": producer.stage, "instance": producer.instance}
-        )
+        of_frame = {"run": source.run, "seq": source.seq, "stamp_ns": source.stamp_ns}
+        return cls.model_validate({**content, **of_frame, "stage": producer.stage, "instance": producer.instance})
 
     @property
-    def frame_id(self) -> tuple[int, int]:
-        """(seq, stamp_ns): equal for all messages about one frame."""
-        return self.seq, self.stamp_ns
+    def frame_id(self) -> FrameId:
+        """(run, seq): equal for all messages about one frame."""
+        return FrameId(self.run, self.seq)
 
 
 # --- camera -----------------------------------------------------------------------------------------------------------
@@ -119,6 +136,9 @@ class CameraMount(Part):
     position_m: Position = Field(default=(0.0, 0.0, 1.3), description="Optical centre in base_link, metres.")
     yaw_deg: Degree = Field(default=0.0, description="Turn of the optical axis to the robot's left, degrees.")
     pitch_up_deg: Degree = Field(default=0.0, description="Tilt of the optical axis above the horizontal, degrees.")
+    roll_deg: Degree = Field(
+        default=0.0, description="Turn of the camera about its optical axis, clockwise as seen from behind it, degrees."
+    )
 
 
 class CameraInfo(Produced):
@@ -138,7 +158,10 @@ class CameraInfo(Produced):
     intrinsics: Text = Field(default="", description="Where camera_matrix comes from, e.g. an assumed field of view.")
     mount: CameraMount = Field(default_factory=CameraMount)
     lockstep: bool = Field(default=False, description="The next frame waits for fusion's answer; stamps are media time.")
-    last_seq: int = Field(default=-1, ge=-1, le=2**63 - 1, description="Last frame published; of use when `ended`.")
+    run: Count = Field(default=0, description="Run of the last frame published.")
+    last_seq: int = Field(
+        default=-1, ge=-1, le=2**63 - 1, description="`seq` of the last frame published; of use when `ended`."
+    )
 
 
 # --- tracker ----------------------------------------------------------------------------------------------------------
@@ -153,6 +176,13 @@ class KindProbabilities(Part):
     unknown: Share = 0.0
 
 
+class FrontalFace(Part):
+    """A face seen from the front, measured by its shape in this frame alone; not smoothed over frames."""
+
+    centre_px: Point = Field(description="Centre of the head.")
+    width_px: Annotated[float, Field(gt=0, le=MAX_SIDE_PX)] = Field(description="Ear to ear: `anatomy.FACE_WIDTH_M`.")
+
+
 class Track(Part):
     """One tracked skin-coloured blob. Left and right are the person's own."""
 
@@ -162,13 +192,17 @@ class Track(Part):
     kind_probabilities: KindProbabilities
     centroid_px: Point
     bbox_px: tuple[Pixel, Pixel, Extent, Extent] = Field(
-        description="x, y of the top left corner, width, height. Of a face: the face itself, chin to brow, ear to ear."
+        description="x, y of the top left corner, width, height. Of a face: chin to brow, and ear to ear "
+        "(`anatomy.FACE_WIDTH_M`) as it would be seen from the front, about the head's centre also when the head is turned."
     )
     velocity_px_s: tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)]]
     contour: bytes = Field(
         default=b"",
         max_length=MAX_CONTOUR_BYTES,
-        description="Outline: packed little-endian int16 pairs x, y.",
+        description="Outline: packed little-endian int16 pairs x, y. Of a hand: the hand alone, cut from a bare forearm.",
+    )
+    frontal: FrontalFace | None = Field(
+        default=None, description="Of a face: what it shows from the front in this frame, where that was looked for and seen."
     )
     observed: bool = Field(default=True, description="Seen in this frame; false while it is only predicted.")
     confidence: Share = Field(default=1.0, description="Belief that the blob is what its kind says.")
@@ -272,7 +306,8 @@ class PoiBelief(Part):
 class FocalSet(Part):
     """A set of POIs with its mass."""
 
-    poi_ids: list[Name] = Field(max_length=MAX_POIS)
+    poi_ids: list[Name] = Field(max_length=MAX_LISTED, description="Its members; of a larger set the first of them.")
+    size: Count = Field(description="How many members it has.")
     mass: Share
 
 
@@ -285,7 +320,7 @@ class Evidence(Part):
     observed: Text = Field(description="What was observed, e.g. 'point_left' or 'yaw -61.9 +- 3.1 deg'; why nothing was.")
     age_ms: float | None = Field(default=None, ge=0, description="Age of the observation when it was used.")
     weight: Share = Field(description="1 - m(X): 0 for a vacuous assignment.")
-    masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_POIS)
+    masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_LISTED, description="The sets of largest mass.")
 
 
 class PersonBelief(Part):
@@ -294,7 +329,10 @@ class PersonBelief(Part):
     person_id: Count
     position_m: Position | None = Field(default=None, description="Person's head in the map frame; none where unknown.")
     distance_m: float | None = Field(default=None, ge=0)
-    pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS, description="The frame of discernment.")
+    pois: list[PoiBelief] = Field(
+        default_factory=list, max_length=MAX_POIS, description="The likeliest of the frame of discernment, best first."
+    )
+    pois_total: Count = Field(default=0, description="How many POIs the frame of discernment has.")
     unknown: Share = Field(default=1.0, description="Mass of the whole frame of discernment: what is not known.")
     conflict: Share = 0.0
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
@@ -315,7 +353,8 @@ class Target(OfFrame):
     person_id: Count
     final: bool
     poi_ids: list[Name] = Field(max_length=MAX_POIS, description="The answer: one, several when tied, none on abstention.")
-    pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS)
+    pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS, description="The likeliest, best first.")
+    pois_total: Count = Field(default=0, description="How many POIs came into question.")
     conflict: Share
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     reason: Text
@@ -353,19 +392,27 @@ class RejectedEdit(Part):
 
 
 class State(Produced):
-    """Everything fusion knows, answered to a get."""
+    """Everything fusion knows, answered to a get.
+
+    Lists of POIs are cut to the best or first few; `?top=N` asks for more of them, `?poi=ID` for one.
+    """
+
+    VERSION: ClassVar[int] = 2
 
     robot: Name
     sources: list[SourceState] = Field(max_length=16)
     robot_pose: RobotPose | None = None
-    pois: list[Poi] = Field(max_length=MAX_POIS)
+    pois: list[Poi] = Field(max_length=MAX_POIS, description="The first by id; `fusion/poi/**` gives all.")
+    pois_total: Count = Field(default=0, description="How many POIs the registry holds.")
     persons: list[PersonBelief] = Field(max_length=MAX_PERSONS)
+    run: Count = Field(default=0, description="Run of the last frame answered.")
     last_seq: int = Field(default=-1, ge=-1, le=2**63 - 1, description="Last frame answered.")
     open_episodes: list[Text] = Field(default_factory=list, max_length=MAX_PERSONS)
     recent_targets: list[Target] = Field(default_factory=list, max_length=16, description="Final answers, newest last.")
     registry_path: Text = ""
     edits_accepted: Count = 0
     edits_rejected: Count = 0
+    edits_lost: Count = Field(default=0, description="Edits without an answer that came faster than they could be kept.")
     rejected_edits: list[RejectedEdit] = Field(default_factory=list, max_length=16, description="Newest last.")
 
 
@@ -379,7 +426,7 @@ class InputHealth(Part):
     received: Count = 0
     used: Count = 0
     overwritten: Count = Field(default=0, description="Replaced by a newer one before the stage came to it.")
-    too_old: Count = 0
+    too_old: Count = Field(default=0, description="Dropped: older than the topic's age limit when the stage came to it.")
     rejected: Count = Field(default=0, description="Wrong encoding, version or content.")
     last_error: Text = ""
     age_s: float | None = Field(default=None, ge=0, description="Since the last one received.")
@@ -392,6 +439,7 @@ class OutputHealth(Part):
 
     key: Text
     published: Count = 0
+    oversized: Count = Field(default=0, description="Not published: larger than the topic allows.")
     rate_hz: float = Field(default=0.0, ge=0)
 
 

@@ -10,7 +10,15 @@ STAMP_NS = 1_700_000_000_000_000_000
 CAMERA = m.Producer("camera", "robot-1")
 
 FRAME = m.Frame(
-    seq=7, stamp_ns=STAMP_NS, stage="camera", instance="robot-1", width=2, height=2, encoding="bgr8", data=bytes(range(12))
+    run=3,
+    seq=7,
+    stamp_ns=STAMP_NS,
+    stage="camera",
+    instance="robot-1",
+    width=2,
+    height=2,
+    encoding="bgr8",
+    data=bytes(range(12)),
 )
 
 _EVIDENCE = [
@@ -21,7 +29,7 @@ _EVIDENCE = [
         observed="point_left",
         age_ms=12.5,
         weight=0.9,
-        masses=[m.FocalSet(poi_ids=["vase"], mass=0.9), m.FocalSet(poi_ids=["vase", "door"], mass=0.1)],
+        masses=[m.FocalSet(poi_ids=["vase"], size=1, mass=0.9), m.FocalSet(poi_ids=["vase", "door"], size=2, mass=0.1)],
     ),
     m.Evidence(source="headpose", status="dead", observed="nothing: the stage is silent", weight=0.0),
 ]
@@ -37,6 +45,7 @@ _TARGET = m.Target.derive(
     final=True,
     poi_ids=["vase"],
     pois=_POIS,
+    pois_total=2,
     conflict=0.0,
     evidence=_EVIDENCE,
     reason="points to the left; only the vase lies there",
@@ -49,6 +58,7 @@ _PERSON = m.PersonBelief(
     position_m=(1.9, 0.1, 1.6),
     distance_m=1.91,
     pois=_POIS,
+    pois_total=2,
     unknown=0.1,
     conflict=0.0,
     evidence=_EVIDENCE,
@@ -72,7 +82,8 @@ SAMPLES: tuple[m.Message, ...] = (
         distortion_model="plumb_bob",
         distortion=[0.01, -0.02, 0.0, 0.0, 0.0],
         intrinsics="calibration camera_info.yaml",
-        mount=m.CameraMount(position_m=(0.1, 0.0, 1.3), yaw_deg=0.0, pitch_up_deg=2.5),
+        mount=m.CameraMount(position_m=(0.1, 0.0, 1.3), yaw_deg=0.0, pitch_up_deg=2.5, roll_deg=-0.5),
+        run=3,
         last_seq=7,
     ),
     m.Tracks.derive(
@@ -90,6 +101,7 @@ SAMPLES: tuple[m.Message, ...] = (
                 bbox_px=(290.0, 125.0, 60.0, 72.0),
                 velocity_px_s=(1.5, -0.5),
                 contour=struct.pack("<8h", 290, 125, 349, 125, 349, 196, 290, 196),
+                frontal=m.FrontalFace(centre_px=(320.0, 158.0), width_px=61.0),
                 confidence=0.97,
             )
         ],
@@ -128,7 +140,9 @@ SAMPLES: tuple[m.Message, ...] = (
         sources=[m.SourceState(stage="gesture", status="ok", producers=["gesture/edge-3"], age_s=0.02, received=7)],
         robot_pose=_ROBOT_POSE,
         pois=[_POI],
+        pois_total=1,
         persons=[_PERSON],
+        run=3,
         last_seq=7,
         recent_targets=[_TARGET],
         edits_accepted=1,

@@ -9,8 +9,6 @@ from enum import Enum
 
 from . import messages as m
 
-STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
-
 
 class Delivery(Enum):
     """How a topic is delivered, named for its stance; the runtime gives each its Zenoh settings."""
@@ -34,7 +32,10 @@ class By(Enum):
 
 @dataclass(frozen=True)
 class Topic:
-    """One row of the table. `path` follows `deixis/{robot}/`; `{stage}` and `{id}` in it are filled in by `key`."""
+    """One row of the table. `path` follows `deixis/{robot}/`; `{stage}` and `{id}` in it are filled in by `key`.
+
+    `max_bytes` bounds the payload, also of a reply to a get. `max_age_s`: older ones are dropped by those who listen.
+    """
 
     path: str
     type: type[m.Message]
@@ -43,25 +44,34 @@ class Topic:
     delivery: Delivery
     queryable: bool = False
     max_bytes: int = 1 << 20
+    max_age_s: float | None = None
 
     @property
     def version(self) -> int:
         """Version of the payload."""
         return self.type.VERSION
 
+    @property
+    def stage(self) -> str:
+        """The stage that publishes it; `{stage}` where every stage does."""
+        return self.path.split("/", 1)[0]
+
     def key(self, robot: str, **parts: str) -> str:
         """Key expression of the topic for one robot, e.g. `FRAME.key('r1')` or `HEALTH.key('r1', stage='*')`."""
         return f"deixis/{robot}/{self.path.format(**parts)}"
 
 
-FRAME = Topic("camera/frame", m.Frame, By.FRAME, 30.0, Delivery.BULK_NEWEST, max_bytes=128 << 20)
+# A link that was cut gives out what it held back, seconds late, when it is mended.
+MAX_AGE_S = 1.0
+
+FRAME = Topic("camera/frame", m.Frame, By.FRAME, 30.0, Delivery.BULK_NEWEST, max_bytes=128 << 20, max_age_s=MAX_AGE_S)
 CAMERA_INFO = Topic("camera/info", m.CameraInfo, By.CHANGE, None, Delivery.KEEP, queryable=True)
-TRACKS = Topic("tracker/tracks", m.Tracks, By.FRAME, 30.0, Delivery.NEWEST)
-HEAD_POSES = Topic("headpose/poses", m.HeadPoses, By.FRAME, 30.0, Delivery.NEWEST)
-GESTURES = Topic("gesture/gestures", m.Gestures, By.FRAME, 30.0, Delivery.NEWEST)
-BELIEF = Topic("fusion/belief", m.Belief, By.FRAME, 30.0, Delivery.NEWEST)
+TRACKS = Topic("tracker/tracks", m.Tracks, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
+HEAD_POSES = Topic("headpose/poses", m.HeadPoses, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
+GESTURES = Topic("gesture/gestures", m.Gestures, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
+BELIEF = Topic("fusion/belief", m.Belief, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
 TARGET = Topic("fusion/target", m.Target, By.EPISODE, None, Delivery.KEEP_URGENT)
-STATE = Topic("fusion/state", m.State, By.GET, None, Delivery.REPLY, queryable=True)
+STATE = Topic("fusion/state", m.State, By.GET, None, Delivery.REPLY, queryable=True, max_bytes=4 << 20)
 POI = Topic("fusion/poi/{id}", m.Poi, By.CHANGE, None, Delivery.KEEP, queryable=True, max_bytes=64 << 10)
 ROBOT_POSE = Topic("robot/pose", m.RobotPose, By.RATE, None, Delivery.NEWEST)
 HEALTH = Topic("{stage}/health", m.Health, By.RATE, 1.0, Delivery.KEEP, queryable=True)
@@ -69,6 +79,9 @@ HEALTH = Topic("{stage}/health", m.Health, By.RATE, 1.0, Delivery.KEEP, queryabl
 TOPICS: tuple[Topic, ...] = (
     FRAME, CAMERA_INFO, TRACKS, HEAD_POSES, GESTURES, BELIEF, TARGET, STATE, POI, ROBOT_POSE, HEALTH,
 )  # fmt: skip
+
+# The stages that every frame passes, in their order: a row of the table makes one.
+STAGES = tuple(dict.fromkeys(topic.stage for topic in TOPICS if topic.by is By.FRAME))
 
 
 def alive_key(robot: str, stage: str, instance: str) -> str:

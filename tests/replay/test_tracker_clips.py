@@ -36,7 +36,7 @@ def test_face_and_pointing_hand_of_a_clip_are_found(rendered, name, side):
     tracker = Tracker(TrackerConfig())
     faces = hands = raised = 0
     for index, image in frames_of(rendered / f"{name}.mp4", count=76):
-        tracks = tracker.update(image, index * PERIOD_NS)
+        tracks = tracker.update(image, 1, index * PERIOD_NS)
         person = truth[index]["persons"][0]
         faces += any(t.kind == "face" and holds(person["face"]["bbox_visible"], t.centroid_px) for t in tracks)
         if person["phase"] == "stroke":
@@ -50,7 +50,9 @@ def test_face_and_pointing_hand_of_a_clip_are_found(rendered, name, side):
 
 def test_an_empty_room_with_flickering_light_has_nobody_in_it(rendered):
     tracker = Tracker(TrackerConfig())
-    assert not any(tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / "a09_empty_flicker.mp4", count=60))
+    assert not any(
+        tracker.update(image, 1, k * PERIOD_NS) for k, image in frames_of(rendered / "a09_empty_flicker.mp4", count=60)
+    )
 
 
 @pytest.mark.parametrize("name", ["c19_point_m40_crossarm"])
@@ -58,5 +60,5 @@ def test_two_runs_on_the_same_frames_are_equal(rendered, name):
     runs = []
     for _ in range(2):
         tracker = Tracker(TrackerConfig())
-        runs.append([tracker.update(image, k * PERIOD_NS) for k, image in frames_of(rendered / f"{name}.mp4", count=50)])
+        runs.append([tracker.update(image, 1, k * PERIOD_NS) for k, image in frames_of(rendered / f"{name}.mp4", count=50)])
     assert runs[0] == runs[1]

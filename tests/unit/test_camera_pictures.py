@@ -96,7 +96,7 @@ def test_a_picture_of_another_kind_is_refused_with_the_cause(picture: np.ndarray
 def test_what_is_encoded_is_what_the_other_stages_decode(encoding: str, error: int) -> None:
     picture = cv2.GaussianBlur(gradient(320, 240), (9, 9), 0)
     encoded = encode(picture, encoding, 85)  # type: ignore[arg-type]
-    frame = Frame(seq=0, stamp_ns=1, stage="camera", instance="a", **vars(encoded))
+    frame = Frame(run=1, seq=0, stamp_ns=1, stage="camera", instance="a", **vars(encoded))
     assert int(np.abs(decode_image(frame).astype(int) - picture).max()) <= error
 
 

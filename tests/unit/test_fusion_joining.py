@@ -14,15 +14,15 @@ FRAME_NS = 33_333_333
 
 
 def tracks(seq: int, run_ns: int = 10**12) -> Tracks:
-    return Tracks(seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="tracker", instance="t", width=640, height=480)
+    return Tracks(run=1, seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="tracker", instance="t", width=640, height=480)
 
 
 def poses(seq: int, run_ns: int = 10**12) -> HeadPoses:
-    return HeadPoses(seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="headpose", instance="h")
+    return HeadPoses(run=1, seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="headpose", instance="h")
 
 
 def gestures(seq: int, run_ns: int = 10**12) -> Gestures:
-    return Gestures(seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="gesture", instance="g")
+    return Gestures(run=1, seq=seq, stamp_ns=run_ns + seq * FRAME_NS, stage="gesture", instance="g")
 
 
 @pytest.fixture

@@ -171,6 +171,6 @@ def test_an_unknown_setting_is_refused():
 
 
 def test_answers_fit_the_message():
-    tracks = Tracks(seq=3, stamp_ns=10**18, stage="tracker", instance="t", width=640, height=480, tracks=_pointing(2.0))
+    tracks = Tracks(run=1, seq=3, stamp_ns=10**18, stage="tracker", instance="t", width=640, height=480, tracks=_pointing(2.0))
     gestures = GestureRecognizer(GestureConfig()).update(tracks.tracks, tracks.width, tracks.height, tracks.stamp_ns)
     assert Gestures.derive(tracks, Producer("gesture", "g"), gestures=gestures).frame_id == tracks.frame_id

@@ -4,12 +4,12 @@ from deixis_schemas.messages import Frame, Tracks
 
 def frame(seq: int, stamp_ns: int | None = None) -> Frame:
     stamp = seq * 10 if stamp_ns is None else stamp_ns
-    return Frame(seq=seq, stamp_ns=stamp, stage="camera", instance="c", width=1, height=1, encoding="mono8", data=b"x")
+    return Frame(run=1, seq=seq, stamp_ns=stamp, stage="camera", instance="c", width=1, height=1, encoding="mono8", data=b"x")
 
 
 def tracks(seq: int, stamp_ns: int | None = None) -> Tracks:
     stamp = seq * 10 if stamp_ns is None else stamp_ns
-    return Tracks(seq=seq, stamp_ns=stamp, stage="tracker", instance="t", width=1, height=1)
+    return Tracks(run=1, seq=seq, stamp_ns=stamp, stage="tracker", instance="t", width=1, height=1)
 
 
 def test_the_newest_tracks_whose_frame_is_held_are_taken_and_the_older_dropped() -> None:

@@ -8,7 +8,9 @@ from deixis_schemas.messages import Frame
 
 
 def frame(data, encoding, width=8, height=6):
-    return Frame(seq=0, stamp_ns=0, stage="camera", instance="c", width=width, height=height, encoding=encoding, data=data)
+    return Frame(
+        run=1, seq=0, stamp_ns=0, stage="camera", instance="c", width=width, height=height, encoding=encoding, data=data
+    )
 
 
 @pytest.fixture

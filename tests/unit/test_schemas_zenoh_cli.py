@@ -12,7 +12,7 @@ from deixis_schemas.zenoh_cli import decode
 
 POI_KEY = "deixis/r1/fusion/poi/vase"
 POI = Poi(poi_id="vase", position_m=(1.0, 2.0, 3.0))
-FRAME = Frame(stamp_ns=1, stage="camera", instance="a", seq=7, width=2, height=2, encoding="bgr8", data=bytes(range(12)))
+FRAME = Frame(stamp_ns=1, stage="camera", instance="a", run=1, seq=7, width=2, height=2, encoding="bgr8", data=bytes(range(12)))
 
 
 class Key:

@@ -37,7 +37,7 @@ class Preparation:
         self._intrinsics: dict[tuple[int, int], Intrinsics] = {}
         self._notes: dict[str, str] = {}
 
-    def prepare(self, picture: Picture, time_ns: int) -> Ready | None:
+    def prepare(self, picture: Picture, passes: int, time_ns: int) -> Ready | None:
         """The picture ready to publish at `time_ns`; None where the rate limit leaves it out. Raises PictureRefused."""
         if not self._rate_limit.lets(time_ns):
             return None
@@ -47,7 +47,9 @@ class Preparation:
             self._note_change("scaled", f"pictures of {_by(normal.arrived_px)} are scaled down to {_by(normal.size_px)}")
         if self._normaliser.deep:
             self._note_change("depth", f"16-bit pictures are taken as {self._normaliser.bits}-bit and published as 8-bit")
-        return Ready(picture.seq, time_ns, encode(normal.image, self._config.encoding, self._config.quality), intrinsics)
+        return Ready(
+            passes, picture.seq, time_ns, encode(normal.image, self._config.encoding, self._config.quality), intrinsics
+        )
 
     def _intrinsics_for(self, size: tuple[int, int]) -> Intrinsics:
         if size not in self._intrinsics:
@@ -89,6 +91,7 @@ class Capture(threading.Thread):
         self._preparation = Preparation(config, calibration, lambda key, text: self._report(Noted(key, text)))
         self._backoff = Backoff(config.retry_first_s, config.retry_longest_s)
         self._shift_ns = 0
+        self._passes = -1
 
     def stop(self, longest_s: float) -> None:
         """Ask the thread to end and wait at most `longest_s`; a read that hangs in FFmpeg cannot be interrupted."""
@@ -125,6 +128,8 @@ class Capture(threading.Thread):
             source.open()
             if source.live and self._lockstep:
                 raise SourceRefused(f"'{source.name}' is live: lockstep needs a file or a folder of pictures")
+            if self._passes < 0 or not source.live:  # a live source that comes back goes on counting
+                self._passes += 1
             self._report(Opened(source.live, source.rate_hz))
             end = self._read_to_end(source)
             if not self._config.loop or self._stopped.is_set():
@@ -165,7 +170,7 @@ class Capture(threading.Thread):
         return end
 
     def _hand_over(self, picture: Picture, live: bool) -> None:
-        ready = self._preparation.prepare(picture, picture.time_ns if live else picture.time_ns + self._shift_ns)
+        ready = self._preparation.prepare(picture, self._passes, picture.time_ns if live else picture.time_ns + self._shift_ns)
         if ready is None:
             return
         put = self._handoff.put_live if live else self._handoff.put_recorded

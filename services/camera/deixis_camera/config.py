@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
+from deixis_runtime.settings import StageConfig
 from deixis_schemas.messages import CameraMount
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
 
-class CameraConfig(BaseModel):
+class CameraConfig(StageConfig):
     """What to read and how to publish it."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     source: str = Field(
         default="0",

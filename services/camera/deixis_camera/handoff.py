@@ -14,8 +14,9 @@ from .encode import Encoded
 
 @dataclass(frozen=True)
 class Ready:
-    """A picture ready to publish; `seq` and `time_ns` as in sources.Picture."""
+    """A picture ready to publish; `passes` before this one were played, `seq` and `time_ns` as in sources.Picture."""
 
+    passes: int
     seq: int
     time_ns: int
     encoded: Encoded

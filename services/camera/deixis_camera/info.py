@@ -17,6 +17,7 @@ class CameraStatus:
         self._size = (0, 0)
         self._rate_hz = 0.0
         self._intrinsics: Intrinsics | None = None
+        self._run = 0
         self._last_seq = -1
         self._state: CameraState = "starting"
         self._reason = ""
@@ -46,9 +47,9 @@ class CameraStatus:
         self.changed |= news
         return news
 
-    def published(self, seq: int) -> None:
+    def published(self, run: int, seq: int) -> None:
         """The frame went out; not news by itself."""
-        self._last_seq = seq
+        self._run, self._last_seq = run, seq
 
     def info(self, producer: Producer, stamp_ns: int) -> CameraInfo:
         """The message."""
@@ -69,5 +70,6 @@ class CameraStatus:
             intrinsics=intrinsics.source if intrinsics else "",
             mount=self._mount,
             lockstep=self._lockstep,
+            run=self._run,
             last_seq=self._last_seq,
         )

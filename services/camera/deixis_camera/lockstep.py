@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from deixis_schemas.messages import FrameId
+
 EPOCH_NS = 1_000_000_000_000_000_000
 """Stamp of media time 0 in lockstep: 2001-09-09T01:46:40Z, a round number that nobody takes for today."""
 
@@ -15,14 +17,14 @@ class Lockstep:
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s
-        self._open: tuple[int, int] | None = None
+        self._open: FrameId | None = None
         self._sent_s = 0.0
 
-    def sent(self, frame_id: tuple[int, int], now_s: float) -> None:
-        """The frame (seq, stamp_ns) was published."""
+    def sent(self, frame_id: FrameId, now_s: float) -> None:
+        """The frame was published."""
         self._open, self._sent_s = frame_id, now_s
 
-    def answered(self, frame_id: tuple[int, int]) -> None:
+    def answered(self, frame_id: FrameId) -> None:
         """fusion/belief of this frame came; one of another frame changes nothing."""
         if frame_id == self._open:
             self._open = None
@@ -34,7 +36,7 @@ class Lockstep:
     def given_up(self) -> int | None:
         """`seq` of a frame whose answer never came, once; call it when `may_feed` says yes."""
         unanswered, self._open = self._open, None
-        return unanswered[0] if unanswered else None
+        return unanswered.seq if unanswered else None
 
 
 class Readiness:

@@ -8,7 +8,7 @@ import cv2
 from deixis_runtime.queries import Query
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Frame, HealthState, Message
+from deixis_schemas.messages import CameraInfo, Frame, FrameId, HealthState, Message
 
 from .calibration import AssumedFieldOfView, Calibration, CalibrationError, load_calibration
 from .capture import Capture
@@ -45,6 +45,8 @@ class CameraStage:
         self._info_due_s = 0.0
         self._frames_since_info = 0
         self._stamp_ns = EPOCH_NS
+        # Live, the time of the start tells one start from another; in lockstep two runs are to be equal.
+        self._first_run = node.started_before << 32 if node.lockstep else node.now_ns() // 1_000_000
         self._picture_s = 0.0
         node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
 
@@ -148,13 +150,14 @@ class CameraStage:
             self._node.warn("lockstep", f"fusion did not answer frame {unanswered} within {limit:g} s; the next is fed")
         stamp_ns = EPOCH_NS + picture.time_ns
         self._publish(picture, stamp_ns)
-        self._lockstep.sent((picture.seq, stamp_ns), now_s)
+        self._lockstep.sent(FrameId(self._first_run + picture.passes, picture.seq), now_s)
         self._handoff.drop_first()
 
     def _publish(self, picture: Ready, stamp_ns: int) -> None:
-        encoded, producer = picture.encoded, self._node.producer
+        encoded, producer, run = picture.encoded, self._node.producer, self._first_run + picture.passes
         with self._node.step():
             frame = Frame(
+                run=run,
                 seq=picture.seq,
                 stamp_ns=stamp_ns,
                 stage=producer.stage,
@@ -171,7 +174,7 @@ class CameraStage:
             self._frames_since_info += 1
             self._publish_info()  # before the frame where it is news: who reads the frame needs its intrinsics
             self._frames.put(frame)
-        self._status.published(picture.seq)
+        self._status.published(run, picture.seq)
         self._picture_s = self._node.monotonic_s()
         self._hold_s = 0.0
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from deixis_runtime.settings import StageConfig
+from pydantic import Field, model_validator
 
 
-class FusionConfig(BaseModel):
+class FusionConfig(StageConfig):
     """Settings; the defaults are what the labelled clips were scored with."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     rules: Literal["paper", "deixis"] = Field(
         default="deixis",
@@ -26,9 +25,6 @@ class FusionConfig(BaseModel):
         default=5.0, gt=0, le=60, description="The same in lockstep, where a slow machine must not change the answers."
     )
     dead_after_s: float = Field(default=1.5, gt=0, le=60, description="A silent stage without liveliness is dead after this.")
-    jump_back_s: float = Field(
-        default=1.0, gt=0, le=60, description="Stamps that fall back by more are a new run of the camera."
-    )
 
     source_silent_s: float = Field(default=1.5, gt=0, le=60, description="Without frames for so long, open episodes are ended.")
 

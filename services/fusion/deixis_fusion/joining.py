@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from deixis_schemas.messages import Gestures, HeadPoses, OfFrame, Tracks
+from deixis_schemas.messages import FrameId, Gestures, HeadPoses, OfFrame, Tracks
 
-FrameId = tuple[int, int]
 Part = Tracks | HeadPoses | Gestures
 
 TRACKER, HEADPOSE, GESTURE = "tracker", "headpose", "gesture"
@@ -50,18 +49,18 @@ class _Pending:
 
 
 class FrameJoiner:
-    """Collects the parts of frames and hands out each frame once.
+    """Collects the parts of frames and hands out each frame once, in the order of `seq`.
 
     A frame is due when every stage has answered it or, which is as good as a no, a later one; or when `age_limit_s` has
-    passed since its tracks arrived. Frames are ordered by their stamps.
+    passed since its tracks arrived. Tracks of another run begin that run: what is left of the last one is dropped.
     """
 
-    def __init__(self, age_limit_s: float, jump_back_s: float) -> None:
+    def __init__(self, age_limit_s: float) -> None:
         self._age_limit_s = age_limit_s
-        self._jump_back_ns = int(jump_back_s * 1e9)
         self._pending: dict[FrameId, _Pending] = {}
-        self._newest_ns: dict[str, int] = {}
-        self._answered_ns = -1
+        self._newest: dict[str, int] = {}
+        self._run: int | None = None
+        self._answered = -1
         self.late = 0
 
     def add(self, part: Part, now_s: float) -> bool:
@@ -69,59 +68,65 @@ class FrameJoiner:
 
         Parts of frames that have been answered are dropped and counted as `late`.
         """
-        new_run = isinstance(part, Tracks) and part.stamp_ns < self._answered_ns - self._jump_back_ns
-        if new_run:
-            self._restart(part.stamp_ns)
-        if part.stamp_ns <= self._answered_ns:
+        new_run = isinstance(part, Tracks) and self._run not in (None, part.run)
+        if self._run is None or new_run:
+            self._begin(part.run)
+        if part.run == self._run and part.seq <= self._answered:
             self.late += 1
-            return False
-        stage = stage_of(part)
-        self._newest_ns[stage] = max(self._newest_ns.get(stage, -1), part.stamp_ns)
+            return new_run
         pending = self._pending.setdefault(part.frame_id, _Pending(now_s))
         if isinstance(part, Tracks):
             pending.arrived_s = now_s
-        if pending.frame.part_of(stage) is None:
+        if pending.frame.part_of(stage_of(part)) is None:
             _fill(pending.frame, part)
+        if part.run == self._run:
+            self._newest[stage_of(part)] = max(self._newest.get(stage_of(part), -1), part.seq)
         self._forget_oldest()
         return new_run
 
     def due(self, now_s: float, absent: Collection[str] = ()) -> list[JoinedFrame]:
         """The frames to be answered now, oldest first. Stages in `absent` are known to be dead and not waited for."""
         ready = []
-        for frame_id in sorted(self._pending, key=lambda key: (key[1], key[0])):
+        for frame_id in sorted(self._of_this_run()):
             pending = self._pending[frame_id]
             if not self._is_due(frame_id, pending, now_s, absent):
                 break
             frame = pending.frame
             frame.missing = tuple(stage for stage in STAGES if frame.part_of(stage) is None)
             ready.append(frame)
-            self._answered_ns = frame_id[1]
+            self._answered = frame_id.seq
             del self._pending[frame_id]
         return ready
 
     def next_due_s(self) -> float | None:
         """When the oldest frame reaches the age limit (monotonic seconds); none where nothing waits."""
-        if not self._pending:
-            return None
-        return min(pending.arrived_s for pending in self._pending.values()) + self._age_limit_s
+        arrivals = [self._pending[frame_id].arrived_s for frame_id in self._of_this_run()]
+        return min(arrivals) + self._age_limit_s if arrivals else None
+
+    def _of_this_run(self) -> list[FrameId]:
+        return [frame_id for frame_id in self._pending if frame_id.run == self._run]
 
     def _is_due(self, frame_id: FrameId, pending: _Pending, now_s: float, absent: Collection[str]) -> bool:
         if now_s - pending.arrived_s >= self._age_limit_s:
             return True
         return all(
-            pending.frame.part_of(stage) is not None or stage in absent or self._newest_ns.get(stage, -1) > frame_id[1]
+            pending.frame.part_of(stage) is not None or stage in absent or self._newest.get(stage, -1) > frame_id.seq
             for stage in STAGES
         )
 
-    def _restart(self, stamp_ns: int) -> None:
-        """Stamps start anew: what was kept of the last run is older than anything to come, and would block it."""
-        self._pending = {key: pending for key, pending in self._pending.items() if key[1] <= stamp_ns + self._jump_back_ns}
-        self._newest_ns = {}
-        self._answered_ns = -1
+    def _begin(self, run: int) -> None:
+        # Poses and gestures may have come before the first tracks of their run: keys do not wait for each other.
+        self._pending = {frame_id: pending for frame_id, pending in self._pending.items() if frame_id.run == run}
+        self._run, self._answered = run, -1
+        self._newest = {}
+        for frame_id, pending in self._pending.items():
+            for stage in STAGES:
+                if pending.frame.part_of(stage) is not None:
+                    self._newest[stage] = max(self._newest.get(stage, -1), frame_id.seq)
 
     def _forget_oldest(self) -> None:
         while len(self._pending) > MAX_PENDING:
-            del self._pending[min(self._pending, key=lambda key: key[1])]
+            del self._pending[min(self._pending, key=lambda frame_id: self._pending[frame_id].arrived_s)]
             self.late += 1
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 
-from deixis_schemas.messages import Evidence, FocalSet, Poi, PoiBelief
+from deixis_schemas.messages import MAX_LISTED, Evidence, FocalSet, Poi, PoiBelief
 
 from .belief import BeliefAssignment, members
 from .discernment import Candidate
 from .judgement import Judgement
 from .witnesses import Witness, Witnesses
-
-# A mass function over many POIs has that many focal sets; the small ones are of no use to a reader.
-MAX_FOCAL_SETS = 64
 
 
 def poi_beliefs(judgement: Judgement, seen: Sequence[Candidate]) -> list[PoiBelief]:
@@ -63,5 +61,9 @@ def _evidence(
 
 
 def _focal_sets(assignment: BeliefAssignment, seen: Sequence[Candidate]) -> list[FocalSet]:
-    largest = sorted(assignment.masses.items(), key=lambda item: (-item[1], item[0]))[:MAX_FOCAL_SETS]
-    return [FocalSet(poi_ids=[seen[i].poi.poi_id for i in members(subset)], mass=mass) for subset, mass in largest if mass > 0]
+    largest = sorted(assignment.masses.items(), key=lambda item: (-item[1], item[0]))[:MAX_LISTED]
+    return [
+        FocalSet(poi_ids=[seen[i].poi.poi_id for i in islice(members(subset), MAX_LISTED)], size=subset.bit_count(), mass=mass)
+        for subset, mass in largest
+        if mass > 0
+    ]

@@ -11,7 +11,7 @@ from deixis_runtime.queries import Query
 from deixis_runtime.settings import ConfigError
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Message, PersonBelief, RobotPose, State, Target
+from deixis_schemas.messages import CameraInfo, FrameId, Message, PersonBelief, RobotPose, State, Target
 
 from .config import FusionConfig
 from .fusion import Fusion
@@ -38,14 +38,14 @@ class FusionService:
         self._node = node
         self._registry = registry
         self._fusion = Fusion(config, node.producer)
-        self._joiner = FrameJoiner(config.lockstep_age_limit_s if node.lockstep else config.age_limit_s, config.jump_back_s)
+        self._joiner = FrameJoiner(config.lockstep_age_limit_s if node.lockstep else config.age_limit_s)
         self._monitor = SourceMonitor((*STAGES, "camera"), config.dead_after_s)
         self._end = SourceEnd(config.source_silent_s)
         self._edits = PoiEdits(registry, topics.POI.key(node.robot, id=""))
         self._started_s = node.monotonic_s()
         self._robot_pose: RobotPose | None = None
         self._persons: list[PersonBelief] = []
-        self._last_seq = -1
+        self._last = FrameId(0, -1)
         self._targets: deque[Target] = deque(maxlen=KEPT_TARGETS)
 
         self._parts = [node.subscribe(topic, depth=DEPTH) for topic in (topics.TRACKS, topics.HEAD_POSES, topics.GESTURES)]
@@ -152,8 +152,8 @@ class FusionService:
             # Targets first: in lockstep the belief lets the next frame go.
             self._publish(targets)
             self._belief.put(belief)
-        self._persons, self._last_seq = belief.persons, belief.seq
-        self._end.answered(belief.seq, now_s)
+        self._persons, self._last = belief.persons, belief.frame_id
+        self._end.answered(belief.frame_id, now_s)
         self._node.count("frames_answered")
         for stage in frame.missing:
             self._node.count(f"missing_{stage}")
@@ -190,7 +190,9 @@ class FusionService:
             robot_pose=self._robot_pose,
             pois=self._registry.pois(),
             persons=self._persons,
-            last_seq=self._last_seq,
+            pois_total=len(self._registry.pois()),
+            run=self._last.run,
+            last_seq=self._last.seq,
             open_episodes=self._fusion.open_episodes()[:MAX_OPEN],
             recent_targets=list(self._targets),
             registry_path=str(self._registry.path)[:2000],

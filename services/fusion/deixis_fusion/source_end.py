@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deixis_schemas.messages import CameraInfo
+from deixis_schemas.messages import CameraInfo, FrameId
 
 # The last frames of a source may be lost on the way (newest wins): then its end is believed after this.
 GRACE_S = 1.0
@@ -16,7 +16,7 @@ class SourceEnd:
         self._ended: CameraInfo | None = None
         self._ended_s = 0.0
         self._answered_s: float | None = None
-        self._answered_seq = -1
+        self._answered: FrameId | None = None
 
     def hear(self, info: CameraInfo, now_s: float) -> None:
         """The camera says how it is; it repeats that every few seconds."""
@@ -25,9 +25,9 @@ class SourceEnd:
         elif self._ended is None:
             self._ended, self._ended_s = info, now_s
 
-    def answered(self, seq: int, now_s: float) -> None:
+    def answered(self, frame_id: FrameId, now_s: float) -> None:
         """A frame was answered."""
-        self._answered_s, self._answered_seq = now_s, seq
+        self._answered_s, self._answered = now_s, frame_id
 
     def is_over(self, now_s: float, waits: bool) -> bool:
         """Whether no frame is to come any more; true once, until the next frame is answered.
@@ -36,10 +36,10 @@ class SourceEnd:
         """
         if self._answered_s is None:
             return False
-        last_seen = self._ended is not None and self._answered_seq >= self._ended.last_seq
+        last_seen = self._ended is not None and self._answered == FrameId(self._ended.run, self._ended.last_seq)
         ended = self._ended is not None and (last_seen or now_s - self._ended_s > GRACE_S)
         silent = not waits and now_s - self._answered_s > self._silent_s
         if not (ended or silent):
             return False
-        self._answered_s, self._answered_seq = None, -1
+        self._answered_s, self._answered = None, None
         return True

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from deixis_runtime.settings import StageConfig
+from pydantic import Field
 
 
-class GestureConfig(BaseModel):
+class GestureConfig(StageConfig):
     """When a hand gestures, and when a gesture is a pointing."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     face_box_share: float = Field(
         default=0.9,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from deixis_schemas.messages import Gesture, Track
+from deixis_schemas.runs import RunClock
 
 from .config import GestureConfig
 from .person import Person
@@ -16,19 +17,19 @@ class GestureRecognizer:
     def __init__(self, config: GestureConfig) -> None:
         self._config = config
         self._persons: dict[int, Person] = {}
-        self._last_ns: int | None = None
+        self._clock = RunClock()
 
-    def update(self, tracks: Sequence[Track], width: int, height: int, stamp_ns: int) -> list[Gesture]:
-        """Gestures of the frame of size `width` x `height` taken at `stamp_ns`, in the order of `person_id`.
+    def update(self, tracks: Sequence[Track], width: int, height: int, run: int, stamp_ns: int) -> list[Gesture]:
+        """Gestures of the frame of size `width` x `height` of that run taken at `stamp_ns`, in the order of `person_id`.
 
-        Time that runs backwards (a restarted camera, a looped clip) starts anew. Raises ValueError for an empty frame.
+        Another run of the camera starts anew. Raises ValueError for an empty frame.
         """
         if width <= 0 or height <= 0:
             raise ValueError(f"width, height: {width} x {height}, must be positive")
-        if self._last_ns is not None and stamp_ns <= self._last_ns:
+        moment = self._clock.advance(run, stamp_ns)
+        if moment.new_run:
             self._persons.clear()
-        self._last_ns = stamp_ns
-        time_s = stamp_ns * 1e-9
+        time_s = moment.now_ns * 1e-9
         of_person: dict[int, list[Track]] = {}
         for track in tracks:
             if track.person_id is not None:

@@ -20,7 +20,7 @@ def serve(node: Node, config: GestureConfig) -> None:
         if seen is None:
             continue
         with node.step():
-            gestures = recognizer.update(seen.tracks, seen.width, seen.height, seen.stamp_ns)
+            gestures = recognizer.update(seen.tracks, seen.width, seen.height, seen.run, seen.stamp_ns)
             out.put(Gestures.derive(seen, node.producer, gestures=gestures))
 
 

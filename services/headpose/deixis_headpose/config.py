@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from deixis_runtime.settings import StageConfig
+from pydantic import Field
 
 
-class HeadposeConfig(BaseModel):
+class HeadposeConfig(StageConfig):
     """Settings of the headpose stage; defaults are for adults one to four metres from a VGA camera."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     max_persons: int = Field(default=3, ge=1, le=16, description="Heads matched per frame, largest first; bounds the work.")
     frames_kept: int = Field(default=6, ge=1, le=64, description="Last frames kept to be joined with their tracks.")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from deixis_schemas.messages import HeadPose, Track
+from deixis_schemas.runs import RunClock
 from numpy.typing import NDArray
 
 from .config import HeadposeConfig
@@ -19,19 +20,22 @@ class HeadPoseEstimator:
 
     def __init__(self, config: HeadposeConfig) -> None:
         self._config = config
+        self._clock = RunClock()
         self._surface = ellipsoid(config.head_semi_axes_m, config.surface_points, highest=-0.92, lowest=0.85)
         self._heads: dict[int, TrackedHead] = {}
         self._seen_ns: dict[int, int] = {}
 
-    def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], stamp_ns: int) -> list[HeadPose]:
+    def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], run: int, stamp_ns: int) -> list[HeadPose]:
         """Estimate the heads of one frame.
 
-        image: (H, W, 3) BGR or (H, W) grey, uint8. tracks: those of the same frame. stamp_ns: its capture time; a time that
-        goes back starts all heads anew. Raises ValueError for a picture of another type.
+        image: (H, W, 3) BGR or (H, W) grey, uint8. tracks: those of the same frame. run: the camera's; another one starts
+        all heads anew. stamp_ns: capture time. Raises ValueError for a picture of another type.
         """
         if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
             raise ValueError(f"image: needs uint8 of shape (H, W, 3) or (H, W), got {image.dtype} {image.shape}")
-        if any(stamp_ns < seen for seen in self._seen_ns.values()):
+        moment = self._clock.advance(run, stamp_ns)
+        stamp_ns = moment.now_ns
+        if moment.new_run:
             self._heads.clear()
             self._seen_ns.clear()
         faces = _largest_faces(tracks, self._config.max_persons)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import OrderedDict, deque
 from collections.abc import Iterable
 
-from deixis_schemas.messages import Frame, Tracks
-
-FrameId = tuple[int, int]
+from deixis_schemas.messages import Frame, FrameId, Tracks
 
 
 class FrameJoiner:
-    """Keeps the last few frames and the last few tracks, and gives the newest pair of the same (seq, stamp_ns).
+    """Keeps the last few frames and the last few tracks, and gives the newest pair of the same run and `seq`.
 
     A pair is given once, and never one that is older than one already given, except from a camera that started anew.
     """

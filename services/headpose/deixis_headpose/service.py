@@ -47,7 +47,7 @@ def _poses(node: Node, estimator: HeadPoseEstimator, frame: Frame, tracks: Track
             f"frame {frame.seq} is {frame.width} x {frame.height}",
         )
         return HeadPoses.derive(frame, node.producer, poses=[])
-    poses = estimator.update(image, tracks.tracks, frame.stamp_ns)
+    poses = estimator.update(image, tracks.tracks, frame.run, frame.stamp_ns)
     return HeadPoses.derive(frame, node.producer, poses=poses)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from deixis_runtime.settings import StageConfig
+from pydantic import Field
 
 
-class TrackerConfig(BaseModel):
+class TrackerConfig(StageConfig):
     """How frames become face and hand tracks. Lengths are in face widths, as published, unless the name says otherwise."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     work_width_px: int = Field(
         default=640,

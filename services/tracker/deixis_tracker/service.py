@@ -24,7 +24,7 @@ def serve(node: Node, config: TrackerConfig) -> None:
             continue
         with node.step():
             try:
-                tracks = tracker.update(decode_image(frame), frame.stamp_ns)
+                tracks = tracker.update(decode_image(frame), frame.run, frame.stamp_ns)
             except (ImageError, ValueError) as error:
                 node.count("frames_refused")
                 node.warn("frame", f"frame {frame.seq} refused: {error}")

@@ -11,6 +11,7 @@ import math
 import cv2
 import numpy as np
 from deixis_schemas.messages import KindProbabilities, Track
+from deixis_schemas.runs import RunClock
 from numpy.typing import NDArray
 
 from deixis_tracker.background import Background
@@ -62,12 +63,13 @@ class Tracker:
         self._shape: tuple[int, int] | None = None
         self._ids = 0
         self._person_ids = 0
+        self._clock = RunClock()
         self._stamp_ns = 0
 
-    def update(self, image: Image, stamp_ns: int) -> list[Track]:
-        """Track one frame: (H, W, 3) uint8 BGR, captured at `stamp_ns`; the tracks are in its pixels.
+    def update(self, image: Image, run: int, stamp_ns: int) -> list[Track]:
+        """Track one frame: (H, W, 3) uint8 BGR, of that run of the camera, captured at `stamp_ns`; tracks in its pixels.
 
-        A frame of another size, or from before the last one, starts anew. Raises ValueError for another type or shape of array.
+        A frame of another run or another size starts anew. Raises ValueError for another type or shape of array.
         """
         if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
             raise ValueError(f"image: {image.dtype} {image.shape}, but a frame is uint8 (height, width, 3)")
@@ -78,12 +80,12 @@ class Tracker:
         scale = min(1.0, self._config.work_width_px / max(image.shape[:2]))
         size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
         work = image if scale == 1 else np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-        if self._shape != image.shape[:2] or stamp_ns < self._stamp_ns:
+        moment = self._clock.advance(run, stamp_ns)
+        if self._shape != image.shape[:2] or moment.new_run:
             self._shape = (image.shape[0], image.shape[1])
-            self._reset(work, stamp_ns)
-        dt_s = min(LONGEST_STEP_S, (stamp_ns - self._stamp_ns) / 1e9)
-        self._stamp_ns = stamp_ns
-        self._step(work, stamp_ns, dt_s)
+            self._reset(work, moment.now_ns)
+        self._stamp_ns = moment.now_ns
+        self._step(work, moment.now_ns, min(LONGEST_STEP_S, moment.elapsed_s))
         return [track for person in self._persons for track in self._tracks(person, 1 / scale)]
 
     def _reset(self, work: Image, stamp_ns: int) -> None:
