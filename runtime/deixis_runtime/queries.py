@@ -136,6 +136,11 @@ class EditQueue:
         return [_edit_of(sample) for sample in samples]
 
 
+def key_matches(expression: str, key: str) -> bool:
+    """Whether a Zenoh key expression takes in a concrete key, by Zenoh's own rules."""
+    return bool(zenoh.KeyExpr(expression).includes(zenoh.KeyExpr(key)))
+
+
 def _edit_of(sample: zenoh.Sample) -> Edit:
     kind: Literal["put", "delete"] = "put" if sample.kind == zenoh.SampleKind.PUT else "delete"
     return Edit(str(sample.key_expr), kind, sample.payload.to_bytes(), str(sample.encoding))

@@ -13,10 +13,11 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import zenoh
-from deixis_schemas import topics
+from deixis_schemas import codec, topics
 from deixis_schemas.messages import HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
+from .delivery import PROFILES
 from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
@@ -85,6 +86,22 @@ class Node:
         publisher = Publisher(self._session, topic, key, lossless=self.lockstep)
         self._outputs.append(publisher)
         return publisher
+
+    def announce(self, topic: Topic, message: Message | None, **parts: str) -> None:
+        """Publish what this stage keeps under a key of its own, or with None that it is gone; not heard by this process."""
+        key, profile = topic.key(self.robot, **parts), PROFILES[topic.delivery]
+        remote = zenoh.Locality.REMOTE
+        if message is None:
+            self._session.delete(key, priority=profile.priority, express=profile.express, allowed_destination=remote)
+            return
+        self._session.put(
+            key,
+            codec.encode(message),
+            encoding=codec.encoding_of(type(message)),
+            priority=profile.priority,
+            express=profile.express,
+            allowed_destination=remote,
+        )
 
     def serve_get(self, key: str, answer: Answer) -> None:
         """Answer gets on a key expression; `answer` is called in the loop, from `wait`."""
