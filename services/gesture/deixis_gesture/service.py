@@ -19,9 +19,9 @@ def serve(node: Node, config: GestureConfig) -> None:
     recognizer = GestureRecognizer(config)
     lens = CameraLens(config.horizontal_fov_deg)
     while node.wait():
-        lens.hear(infos.take_all())
-        node.note("lens", lens.note)
         seen = tracks.take()
+        lens.hear(infos.take_all())  # after taking the tracks: what the camera said before their frame is then here
+        node.note("lens", lens.note)
         if seen is None:
             continue
         with node.step():

@@ -28,10 +28,10 @@ def serve(node: Node, config: HeadposeConfig) -> None:
     estimator = HeadPoseEstimator(config)
     lens = CameraLens(config.horizontal_fov_deg)
     while node.wait():
-        lens.hear(infos.take_all())  # before the frames: a frame is read with what the camera said before it
-        node.note("lens", lens.note)
         joiner.add_frames(frames.take_all())
         joiner.add_tracks(tracks.take_all())
+        lens.hear(infos.take_all())  # after taking the frames: what the camera said before one of them is then here
+        node.note("lens", lens.note)
         pair = joiner.take()
         if pair is None:
             continue
