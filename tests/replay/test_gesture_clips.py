@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from deixis_gesture.config import GestureConfig
 from deixis_gesture.recognizer import GestureRecognizer
+from deixis_runtime.lens import Lens
 from deixis_schemas.messages import KindProbabilities, Track
 
 POINTING = ("point_left", "point_right", "invisible")
+LENS = Lens(640, 480, (560.0, 560.0, 319.5, 239.5))
 HANDS = {"right_hand": 3, "left_hand": 4}
 
 
@@ -40,7 +42,7 @@ def _gestures(folder, name, every):
     frames = json.loads((folder / f"{name}.json").read_text())["frames"]
     recognizer = GestureRecognizer(GestureConfig())
     answers = []
-    width = frames[0]["persons"][0]["face"]["bbox_amodal"][2] / GestureConfig().face_box_share
+    width = frames[0]["persons"][0]["face"]["bbox_amodal"][2]
     with np.load(folder / f"{name}_labels.npz") as archive:
         for i in range(0, len(frames), every):
             labels = cv2.imdecode(archive[f"f{i:04d}"], cv2.IMREAD_UNCHANGED)
@@ -49,7 +51,7 @@ def _gestures(folder, name, every):
             tracks = [_track(0, "face", (x + w / 2 - width / 2, y, width, h))]
             for kind, part in HANDS.items():
                 tracks += _hand(labels, kind, part)
-            (gesture,) = recognizer.update(tracks, 640, 480, 10**18 + i * 10**9 // 30)
+            (gesture,) = recognizer.update(tracks, 640, 480, LENS, 1, 10**18 + i * 10**9 // 30)
             answers.append((truth, gesture))
     return answers
 

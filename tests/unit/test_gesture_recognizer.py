@@ -5,11 +5,17 @@ import math
 import cv2
 import numpy as np
 import pytest
+from deixis_gesture.arm import Arm
 from deixis_gesture.config import GestureConfig
+from deixis_gesture.hand import Face
+from deixis_gesture.person import View
 from deixis_gesture.recognizer import GestureRecognizer
+from deixis_runtime.lens import Lens
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import Gestures, KindProbabilities, Producer, Track, Tracks
 from pydantic import ValidationError
 
+LENS = Lens(640, 480, (560.0, 560.0, 319.5, 239.5))
 FACE_PX = 50.0
 UP_S, HELD_S, DOWN_S, REST_S = 1.0, 1.5, 3.0, 3.5
 POINT = (180,)
@@ -32,8 +38,7 @@ def _track(track_id, person_id, kind, centre, size, contour=b"", **more):
 
 
 def _face(person_id=0, x=320.0):
-    width = FACE_PX / GestureConfig().face_box_share
-    return _track(10 * person_id, person_id, "face", (x, 150.0), (width, 1.2 * width))
+    return _track(10 * person_id, person_id, "face", (x, 150.0), (FACE_PX, 1.3 * FACE_PX))
 
 
 def _hand(place, fingers, person_id=0, x=320.0, track_id=None, kind="right_hand", **more):
@@ -55,10 +60,14 @@ def _place(time_s, held=(-3.4, 1.0), rest=(-1.2, 4.3)):
     return rest[0] + share * (held[0] - rest[0]), rest[1] + share * (held[1] - rest[1])
 
 
-def _played(tracks_at, rate_hz=30, seconds=4.2, recognizer=None, begin_ns=10**18):
+def _steady(time_s):
+    return 10**18 + round(time_s * 1e9)
+
+
+def _played(tracks_at, rate_hz=30, seconds=4.2, recognizer=None, run=1, stamp_ns=_steady):
     recognizer = recognizer or GestureRecognizer(GestureConfig())
     times = [i / rate_hz for i in range(int(seconds * rate_hz))]
-    return [(t, recognizer.update(tracks_at(t), 640, 480, begin_ns + round(t * 1e9))) for t in times]
+    return [(t, recognizer.update(tracks_at(t), 640, 480, LENS, run, stamp_ns(t))) for t in times]
 
 
 def _pointing(time_s):
@@ -147,22 +156,71 @@ def test_every_person_with_a_face_has_one_gesture_and_nobody_else():
             assert [g.gesture for g in gestures] == ["none", "point_left"]
 
 
-def test_time_that_runs_back_starts_anew():
+def test_another_run_of_the_camera_starts_anew():
     recognizer = GestureRecognizer(GestureConfig())
-    first = _played(_pointing, recognizer=recognizer)
-    assert _played(_pointing, recognizer=recognizer, begin_ns=10**17) != []
-    again = GestureRecognizer(GestureConfig())
-    assert first == _played(_pointing, recognizer=again)
+    first = _played(_pointing, seconds=2.5, recognizer=recognizer)  # ends in a stroke
+    assert _played(_pointing, seconds=2.5, recognizer=recognizer, run=2) == first
+
+
+@pytest.mark.parametrize("set_back_at_s", [1.3, 1.6, 2.2])
+def test_a_clock_set_back_by_40_ms_does_not_lose_a_stroke(set_back_at_s):
+    set_back = _played(_pointing, stamp_ns=lambda t: _steady(t) - (40_000_000 if t >= set_back_at_s else 0))
+    assert [g.phase for _, (g,) in set_back] == [g.phase for _, (g,) in _played(_pointing)]
+    assert {(g.phase, g.gesture) for g in _settled(set_back)} == {("stroke", "point_right")}
+
+
+def test_a_frame_of_twice_the_size_through_the_same_lens_gives_the_same_gestures():
+    def twice(track):
+        x, y, w, h = track.bbox_px
+        outline = (2 * np.frombuffer(track.contour, "<i2")).astype("<i2").tobytes()
+        place = (2 * track.centroid_px[0], 2 * track.centroid_px[1])
+        return track.model_copy(update={"bbox_px": (2 * x, 2 * y, 2 * w, 2 * h), "centroid_px": place, "contour": outline})
+
+    large = GestureRecognizer(GestureConfig())
+    for time_s, (small,) in _played(_pointing):
+        tracks = [twice(track) for track in _pointing(time_s)]
+        (seen,) = large.update(tracks, 1280, 960, LENS, 1, _steady(time_s))
+        assert (seen.phase, seen.gesture, seen.hand) == (small.phase, small.gesture, small.hand)
+        assert seen.bearing_deg == pytest.approx(small.bearing_deg, abs=1.0)
+
+
+@pytest.mark.parametrize("focal_px", [300.0, 560.0, 1200.0])
+def test_a_persons_distance_follows_from_the_lens(focal_px):
+    view = View(Lens(640, 480, (focal_px, focal_px, 319.5, 239.5)), (640, 480))
+    assert view.distance_of(Face(320.0, 150.0, focal_px * FACE_WIDTH_M / 2.0)) == pytest.approx(2.0 / FACE_WIDTH_M)
+
+
+@pytest.mark.parametrize("rate_hz", [10, 30, 60])
+def test_a_hand_changes_its_side_as_fast_at_any_frame_rate(rate_hz):
+    arm, face, changed_s = Arm(GestureConfig(), 0.0), Face(320.0, 150.0, FACE_PX), None
+    for i in range(3 * rate_hz):
+        time_s = i / rate_hz
+        hand = _hand((2.0, 4.0), (), kind="left_hand" if time_s < 1 else "right_hand")
+        arm.update(hand, face, time_s, 1 / rate_hz, walking=False, joined=False)
+        changed_s = time_s if arm.side == "right" and changed_s is None else changed_s
+    assert changed_s == pytest.approx(1.14, abs=0.12)
+
+
+@pytest.mark.parametrize("rate_hz", [10, 30])
+def test_the_bearing_is_that_of_the_last_half_second_at_any_frame_rate(rate_hz):
+    arm, face = Arm(GestureConfig(), 0.0), Face(320.0, 150.0, FACE_PX)
+    for i in range(2 * rate_hz + 1):
+        time_s = i / rate_hz
+        place = (-3.4 if time_s < 1.6 else -3.2, 1.0)
+        arm.update(_hand(place, POINT), face, time_s, 1 / rate_hz, walking=False, joined=False)
+    assert arm.phase == "stroke"
+    assert arm.sight is not None
+    assert arm.sight.offset == pytest.approx(-3.95, abs=0.1)
 
 
 def test_a_face_too_small_to_measure_by_gives_no_gesture():
     tiny = _track(0, 0, "face", (320.0, 150.0), (2.0, 2.0))
-    assert GestureRecognizer(GestureConfig()).update([tiny], 640, 480, 1) == []
+    assert GestureRecognizer(GestureConfig()).update([tiny], 640, 480, LENS, 1, 1) == []
 
 
 def test_an_empty_frame_is_refused_by_name():
     with pytest.raises(ValueError, match="width, height: 0 x 480"):
-        GestureRecognizer(GestureConfig()).update([], 0, 480, 1)
+        GestureRecognizer(GestureConfig()).update([], 0, 480, LENS, 1, 1)
 
 
 def test_an_unknown_setting_is_refused():
@@ -172,5 +230,5 @@ def test_an_unknown_setting_is_refused():
 
 def test_answers_fit_the_message():
     tracks = Tracks(run=1, seq=3, stamp_ns=10**18, stage="tracker", instance="t", width=640, height=480, tracks=_pointing(2.0))
-    gestures = GestureRecognizer(GestureConfig()).update(tracks.tracks, tracks.width, tracks.height, tracks.stamp_ns)
+    gestures = GestureRecognizer(GestureConfig()).update(tracks.tracks, 640, 480, LENS, tracks.run, tracks.stamp_ns)
     assert Gestures.derive(tracks, Producer("gesture", "g"), gestures=gestures).frame_id == tracks.frame_id

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
-from deixis_headpose.head import Camera, Pose, ellipsoid, facing_camera, project, rotation_of
+from deixis_headpose.head import Pose, ellipsoid, facing_camera, project, rotation_of
+from deixis_runtime.lens import Pinhole
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-CAMERA = Camera(560.0, 319.5, 239.5)
+CAMERA = Pinhole(560.0, 319.5, 239.5)
 SURFACE = ellipsoid((0.08, 0.115, 0.085), 300, -0.92, 0.85)
 angle = st.floats(-80, 80)
 

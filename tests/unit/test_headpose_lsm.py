@@ -1,28 +1,15 @@
 import numpy as np
 import pytest
-from deixis_headpose.head import Camera, Pose, ellipsoid, project, rotation_of
+from deixis_headpose.head import Pose, ellipsoid, rotation_of
 from deixis_headpose.keyframes import Keyframe, take_keyframe
 from deixis_headpose.lsm import match
 from deixis_headpose.neck import Neck
 from deixis_headpose.patch import Level, pyramid
+from deixis_runtime.lens import Pinhole
+from painted_head import CAMERA, SEMI_AXES_M, painted_head
 
-CAMERA = Camera(560.0, 159.5, 119.5)
-SURFACE = ellipsoid((0.08, 0.115, 0.085), 900, -0.92, 0.85)
+SURFACE = ellipsoid(SEMI_AXES_M, 900, -0.92, 0.85)
 START = Pose(np.eye(3), np.array([0.0, 0.0, 2.0]))
-
-
-def painted_head(pose: Pose, gain: float = 1.0, offset: float = 0.0) -> np.ndarray:
-    """A picture of the ellipsoid with a smooth pattern on it, on a plain background, by splatting many points."""
-    dense = ellipsoid((0.08, 0.115, 0.085), 60000, -1.0, 1.0)
-    x, y, z = (dense.points_m / 0.1).T
-    grey = 128 + 40 * np.sin(7 * x + 1) + 30 * np.cos(6 * y) + 25 * np.sin(5 * z + 2 * x)
-    seen = project(dense, pose, CAMERA)
-    total, count = np.zeros((240, 320)), np.zeros((240, 320))
-    at = np.rint(seen.pixels).astype(int)
-    np.add.at(total, (at[:, 1], at[:, 0]), grey[seen.points])
-    np.add.at(count, (at[:, 1], at[:, 0]), 1)
-    picture = np.where(count > 0, total / np.maximum(count, 1), 90.0)
-    return np.clip(gain * picture + offset, 0, 255).astype(np.uint8)
 
 
 def levels_of(picture: np.ndarray) -> list[Level]:
@@ -63,6 +50,6 @@ def test_a_picture_without_the_head_correlates_below_the_gate(keyframe: Keyframe
 def test_a_head_cut_by_the_edge_of_the_picture_is_no_error(keyframe: Keyframe) -> None:
     picture = painted_head(START)[:, 150:]
     levels = pyramid(picture, (9.5, 119.5), 45.0, 64.0, 3)
-    aside = Camera(560.0, 9.5, 119.5)
+    aside = Pinhole(560.0, 9.5, 119.5)
     result = match(levels[0], SURFACE, [keyframe.templates[0]], START, aside, Neck(START).prior(START, 1 / 30), 3)
     assert np.isfinite(result.pose.position_m).all()

@@ -1,4 +1,4 @@
-"""One arm of a person: the blob of its hand over time."""
+"""One arm of a person: its hand over time."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from deixis_schemas.messages import GestureKind, Phase, Side, Track
 from .bearing import HandSight
 from .config import GestureConfig
 from .fingertips import Finger, find_fingers
-from .hand import CHEST, Face, HandShape, cut_hand, unpack_contour
+from .hand import CHEST, Face, HandShape, hand_of, unpack_contour
 from .phases import PhaseTracker
 from .rules import StrokeGesture, Vote, vote
 
-# Weight of a new frame in the average of which side's hand it is.
-SIDE_RATE = 0.15
-# Frames of a stroke that offset and finger length are the medians of.
-KEEP_MEASURES = 15
+# Time over which it is averaged which side's hand it is.
+SIDE_TIME_S = 0.205
+# Offset and finger length are the medians of so much of a stroke.
+MEASURED_S = 0.48
 # The outline is worth its cost only near a stroke: hands lower than this below the face are at rest.
 LOW = 3.6
 # An arm across the body does not reach farther beyond the face, face widths.
@@ -35,7 +35,7 @@ class Arm:
         self._resting_until_s = resting_until_s
         self._first_s: float | None = None
         self._leftness = 0.0
-        self._measures: deque[tuple[float, float, float]] = deque(maxlen=KEEP_MEASURES)
+        self._measures: deque[tuple[float, HandSight]] = deque()
         self._place_px = (0.0, 0.0)
         self.track_id = -1
         self.seen_s = -math.inf
@@ -61,10 +61,15 @@ class Arm:
 
     @property
     def sight(self) -> HandSight | None:
-        """What the stroke so far shows of the hand: medians of its last frames; None without any."""
+        """What the stroke so far shows of the hand: medians of its last `MEASURED_S`; None without any."""
         if not self._measures:
             return None
-        return HandSight(*(statistics.median(values) for values in zip(*self._measures, strict=True)))
+        sights = [sight for _, sight in self._measures]
+        return HandSight(
+            statistics.median(sight.offset for sight in sights),
+            statistics.median(sight.finger for sight in sights),
+            statistics.median(sight.palm for sight in sights),
+        )
 
     @property
     def is_across(self) -> bool:
@@ -78,11 +83,11 @@ class Arm:
         """How far a track is from where this hand was seen last, pixels."""
         return math.dist(self._place_px, track.centroid_px)
 
-    def update(self, track: Track, face: Face, time_s: float, *, walking: bool, joined: bool) -> None:
-        """Advance by an observed blob of this hand; `joined`: the other hand is held up beside it."""
+    def update(self, track: Track, face: Face, time_s: float, frame_s: float, *, walking: bool, joined: bool) -> None:
+        """Advance by an observed hand; `frame_s`: time since the frame before; `joined`: the other is held up beside it."""
         self.track_id, self.seen_s, self._place_px = track.track_id, time_s, track.centroid_px
         self._first_s = time_s if self._first_s is None else self._first_s
-        self._weigh_side(track)
+        self._weigh_side(track, frame_s)
         hand = self._shape(track, face)
         place = hand.centroid if hand else _about(face, track.centroid_px)
         self.stretch = math.dist(place, CHEST)
@@ -95,21 +100,28 @@ class Arm:
         elif hand:
             seen: Vote = "other" if joined else vote(hand, self.fingers)
             self._stroke.add(time_s, seen, self._was_raised_before_us())
-            self._measures.append((hand.tip[0], self.fingers[0].length if self.fingers else 0.0, hand.palm_radius))
+            self._measure(hand, time_s)
+
+    def _measure(self, hand: HandShape, time_s: float) -> None:
+        finger = self.fingers[0].length if self.fingers else 0.0
+        self._measures.append((time_s, HandSight(hand.tip[0], finger, hand.palm_radius)))
+        while time_s - self._measures[0][0] > MEASURED_S:
+            self._measures.popleft()
 
     def _was_raised_before_us(self) -> bool:
         """The hand was seen rising, or came into sight later than the person did."""
         return self._phases.rose or (self._first_s is not None and self._first_s > self._resting_until_s)
 
-    def _weigh_side(self, track: Track) -> None:
+    def _weigh_side(self, track: Track, frame_s: float) -> None:
+        """By the time a frame stands for, not the time since the hand was seen: a gap says nothing of the side."""
         if track.kind in ("left_hand", "right_hand"):
             sense = 1.0 if track.kind == "left_hand" else -1.0
-            self._leftness += SIDE_RATE * (sense - self._leftness)
+            self._leftness += (1 - math.exp(-frame_s / SIDE_TIME_S)) * (sense - self._leftness)
 
     def _shape(self, track: Track, face: Face) -> HandShape | None:
         if (track.bbox_px[1] - face.y_px) / face.width_px > LOW:
             return None
-        return cut_hand(face.normalised(unpack_contour(track.contour)))
+        return hand_of(face.normalised(unpack_contour(track.contour)))
 
 
 def _about(face: Face, point_px: tuple[float, float]) -> tuple[float, float]:

@@ -13,12 +13,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from deixis_schemas.anatomy import FACE_WIDTH_M
 
-# Eye to fingertip of a stretched arm, face widths (0.77 m by 0.182 m); its spread over people and postures.
-REACH = 4.2
+# How far before the face a stretched arm holds its fingertip, 4.2 face widths; its spread over people and postures.
+REACH = 0.689 / FACE_WIDTH_M
 REACH_SIGMA = 0.06
-# The same for an arm across the body, which the chest stops.
-REACH_ACROSS = 2.8
+# The same for an arm across the body, which the chest stops, 2.8 face widths.
+REACH_ACROSS = 0.459 / FACE_WIDTH_M
 REACH_ACROSS_SIGMA = 0.16
 OFFSET_SIGMA = 0.2
 LEAST_SIGMA_DEG = 8.0

@@ -1,4 +1,7 @@
-"""Settings of the gesture stage. Lengths are in face widths (fw), times in seconds: free of scale and frame rate."""
+"""Settings of the gesture stage. Lengths are in face widths (fw), times in seconds: free of scale and frame rate.
+
+One face width is `anatomy.FACE_WIDTH_M`, the width of a face's box in the tracks.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,6 @@ from pydantic import Field
 class GestureConfig(StageConfig):
     """When a hand gestures, and when a gesture is a pointing."""
 
-    face_box_share: float = Field(
-        default=0.9,
-        gt=0.3,
-        le=2,
-        description="One face width (fw) of these settings, as a share of the width of the tracker's face box.",
-    )
     still_speed: float = Field(
         default=1.3, gt=0, le=20, description="A hand slower than this is still, fw/s (0.045 fw a frame at 30 frames/s)."
     )
@@ -37,9 +34,9 @@ class GestureConfig(StageConfig):
     settle_s: float = Field(default=0.3, ge=0, le=2, description="A stroke lasts this long before its gesture is said.")
     forget_s: float = Field(default=0.4, gt=0, le=5, description="A hand or a face unseen for longer is forgotten.")
     walking_speed: float = Field(default=2.0, gt=0, le=40, description="A person whose face is faster than this walks, fw/s.")
-    focal_length_widths: float = Field(
-        default=0.875,
-        ge=0.2,
-        le=10,
-        description="Focal length in image widths, for the perspective of an arm toward the camera (0.875: 60 degrees wide).",
+    horizontal_fov_deg: float = Field(
+        default=60.0,
+        gt=5,
+        lt=170,
+        description="Width of view assumed until camera/info tells the lens, degrees.",
     )

@@ -1,8 +1,7 @@
-"""The hand cut out of a skin blob, in face widths.
+"""A hand as its outline shows it, in face widths.
 
 Everything is measured in face widths about the face's centre, so that neither the person's distance nor the camera's
-resolution matters. A bare forearm belongs to the same blob as its hand: the hand is what lies within a hand's length of the
-blob's distal end, the point farthest from the chest.
+resolution matters. The outline is that of the hand alone: the tracker has cut it from a bare forearm.
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ Mask = npt.NDArray[np.uint8]
 CELLS = 40
 # Middle of the chest below the face's centre, face widths (anthropometry: shoulder height).
 CHEST = (0.0, 1.6)
-# From the fingertip of a pointing hand to its wrist; PERCEPTION study: about 1.05 face widths.
-HAND_LENGTH = 1.1
-LARGEST_BLOB = 8.0
+# Outlines larger than this, and hands smaller, are none; the first bounds the work as well. Face widths, and their square.
+LARGEST_OUTLINE = 8.0
 LEAST_AREA = 0.02
 
 
@@ -71,34 +69,25 @@ class HandShape:
         """Angle of palm -> tip above the horizontal, -90 to 90."""
         return math.degrees(math.atan2(self.palm[1] - self.tip[1], abs(self.tip[0] - self.palm[0])))
 
-    def at(self, column: float, row: float) -> tuple[float, float]:
-        """Face-width coordinates of a mask pixel."""
-        return self.origin[0] + column / CELLS, self.origin[1] + row / CELLS
-
 
 def unpack_contour(contour: bytes) -> npt.NDArray[np.int16]:
     """Outline of a Track: packed little-endian int16 pairs -> (N, 2) array, pixels."""
     return np.frombuffer(contour, "<i2").reshape(-1, 2)
 
 
-def cut_hand(outline: Points) -> HandShape | None:
-    """The hand of a blob with this outline (N, 2), face widths; None where there is too little or too much of it."""
+def hand_of(outline: Points) -> HandShape | None:
+    """The hand with this outline (N, 2), face widths; None where there is too little or too much of it."""
     if len(outline) < 3:
         return None
     low, high = outline.min(axis=0), outline.max(axis=0)
-    if float((high - low).max()) > LARGEST_BLOB:
+    if float((high - low).max()) > LARGEST_OUTLINE:
         return None
     tip = _distal_extremum(outline)
-    low = np.maximum(low, tip - HAND_LENGTH)
-    high = np.minimum(high, tip + HAND_LENGTH)
     origin = low - 2.0 / CELLS
     columns, rows = (int(n) + 5 for n in np.ceil((high - low) * CELLS))
     mask = np.zeros((rows, columns), np.uint8)
     cv2.fillPoly(mask, [np.rint((outline - origin) * CELLS).astype(np.int32)], (1,))
-    reachable = np.zeros_like(mask)
-    centre = np.rint((tip - origin) * CELLS).astype(int)
-    cv2.circle(reachable, (int(centre[0]), int(centre[1])), round(HAND_LENGTH * CELLS), (1,), -1)
-    return _measured(mask & reachable, (float(origin[0]), float(origin[1])), (float(tip[0]), float(tip[1])))
+    return _measured(mask, (float(origin[0]), float(origin[1])), (float(tip[0]), float(tip[1])))
 
 
 def _distal_extremum(outline: Points) -> Points:

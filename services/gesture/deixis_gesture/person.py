@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
+from deixis_runtime.lens import Lens
 from deixis_schemas.messages import Gesture, Track
 
 from .arm import Arm
@@ -21,6 +23,17 @@ SAME_HAND = 1.2
 # A person seen for less than this may stand with resting hands raised: nobody saw them being raised.
 FIRST_LOOK_S = 0.7
 POINTING = ("point_left", "point_right", "invisible")
+
+
+class View(NamedTuple):
+    """What a frame was taken through: the lens, and the frame's size (width, height), pixels."""
+
+    lens: Lens
+    size: tuple[int, int]
+
+    def distance_of(self, face: Face) -> float:
+        """How far away a face of this width is, face widths."""
+        return self.lens.pinhole_at((face.x_px, face.y_px), self.size).focal_px / face.width_px
 
 
 class Person:
@@ -40,8 +53,8 @@ class Person:
         """The face has been missing for too long."""
         return time_s - self._face_s > self._config.forget_s
 
-    def update(self, tracks: Sequence[Track], width: int, time_s: float) -> Gesture | None:
-        """Gesture of the person in a frame `width` pixels wide; None without a usable face."""
+    def update(self, tracks: Sequence[Track], view: View, time_s: float, frame_s: float) -> Gesture | None:
+        """Gesture of the person as seen at `time_s`, `frame_s` after the frame before; None without a usable face."""
         if math.isinf(self._resting_until_s):
             self._resting_until_s = time_s + FIRST_LOOK_S
         self._follow_face(tracks, time_s)
@@ -51,17 +64,17 @@ class Person:
         hands = [track for track in tracks if track.kind != "face" and track.observed and track.contour]
         for arm, track in self._assigned(hands, SAME_HAND * self._face.width_px):
             joined = _is_joined(track, hands, self._face, self._config)
-            arm.update(track, self._face, time_s, walking=walking, joined=joined)
+            arm.update(track, self._face, time_s, frame_s, walking=walking, joined=joined)
         self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
         self._current = self._gesturing()
-        return self._spoken(self._current, self._face, width)
+        return self._spoken(self._current, self._face, view)
 
     def _follow_face(self, tracks: Sequence[Track], time_s: float) -> None:
         seen = [t for t in tracks if t.kind == "face" and t.bbox_px[2] >= LEAST_FACE_PX]
         if not seen:
             return
         x, y, w, h = max(seen, key=lambda t: (t.observed, t.confidence)).bbox_px
-        now = Face(x + w / 2, y + h / 2, w * self._config.face_box_share)
+        now = Face(x + w / 2, y + h / 2, w)
         old, passed = self._face, time_s - self._face_s
         self._face_s = time_s
         if old is None or passed <= 0 or passed > self._config.forget_s:
@@ -104,11 +117,11 @@ class Person:
 
         return max(self._arms, key=precedence, default=None)
 
-    def _spoken(self, arm: Arm | None, face: Face, width: int) -> Gesture:
+    def _spoken(self, arm: Arm | None, face: Face, view: View) -> Gesture:
         if arm is None or arm.phase == "idle":
             return Gesture(person_id=self._person_id, phase="idle", gesture="none")
         gesture = arm.gesture if arm.phase == "stroke" else "none"
-        bearing = _bearing(arm, self._config.focal_length_widths * width / face.width_px) if gesture in POINTING else None
+        bearing = _bearing(arm, view.distance_of(face)) if gesture in POINTING else None
         return Gesture(
             person_id=self._person_id,
             phase=arm.phase,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from deixis_runtime.lens import Lens
 from deixis_schemas.messages import Gesture, Track
 from deixis_schemas.runs import RunClock
 
 from .config import GestureConfig
-from .person import Person
+from .person import Person, View
 
 
 class GestureRecognizer:
@@ -19,29 +20,29 @@ class GestureRecognizer:
         self._persons: dict[int, Person] = {}
         self._clock = RunClock()
 
-    def update(self, tracks: Sequence[Track], width: int, height: int, run: int, stamp_ns: int) -> list[Gesture]:
-        """Gestures of the frame of size `width` x `height` of that run taken at `stamp_ns`, in the order of `person_id`.
+    def update(self, tracks: Sequence[Track], width: int, height: int, lens: Lens, run: int, stamp_ns: int) -> list[Gesture]:
+        """Gestures of the frame of size `width` x `height`, taken through `lens` at `stamp_ns`, in the order of `person_id`.
 
-        Another run of the camera starts anew. Raises ValueError for an empty frame.
+        Another `run` of the camera starts anew. Raises ValueError for an empty frame.
         """
         if width <= 0 or height <= 0:
             raise ValueError(f"width, height: {width} x {height}, must be positive")
         moment = self._clock.advance(run, stamp_ns)
         if moment.new_run:
             self._persons.clear()
-        time_s = moment.now_ns * 1e-9
+        time_s, view = moment.now_ns * 1e-9, View(lens, (width, height))
         of_person: dict[int, list[Track]] = {}
         for track in tracks:
             if track.person_id is not None:
                 of_person.setdefault(track.person_id, []).append(track)
-        gestures = [self._of_person(person_id, own, width, time_s) for person_id, own in sorted(of_person.items())]
+        gestures = [self._of_person(key, own, view, time_s, moment.elapsed_s) for key, own in sorted(of_person.items())]
         self._persons = {key: person for key, person in self._persons.items() if not person.is_gone(time_s)}
         return [gesture for gesture in gestures if gesture is not None]
 
-    def _of_person(self, person_id: int, tracks: Sequence[Track], width: int, time_s: float) -> Gesture | None:
+    def _of_person(self, person_id: int, tracks: Sequence[Track], view: View, time_s: float, frame_s: float) -> Gesture | None:
         person = self._persons.get(person_id)
         if person is None:
             if not any(track.kind == "face" for track in tracks):
                 return None
             person = self._persons[person_id] = Person(person_id, self._config)
-        return person.update(tracks, width, time_s)
+        return person.update(tracks, view, time_s, frame_s)

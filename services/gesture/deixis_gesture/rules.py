@@ -29,7 +29,7 @@ UPRIGHT_REACH = 0.5
 UPRIGHT_BELOW_FACE = 1.3
 # A finger steeper than 65 degrees points at the ceiling: "wait", "one".
 STEEP = 2.14
-# A blob wider than this is no single hand (a hand before the face, or a wall of skin colour).
+# An outline wider than this is no single hand (a hand before the face, or a wall of skin colour).
 LARGEST_PALM = 0.42
 LARGEST_AREA = 1.0
 # Without a finger: the arm is stretched sideways this far, or the hand is large since it is held toward the camera.
@@ -38,12 +38,12 @@ NEAR_CAMERA_PALM = 0.29
 # Without a long finger the hand is at the height of chin to belly, where an arm ends that points ahead or back: a hand beside
 # the head is rather raised to greet, and such hands have been torn to fingerless rags by a wall of skin colour.
 HEIGHTS_BELOW_FACE = (0.3, 2.2)
-# Share of the blob that the largest circle in it fills: 0.4 to 0.65 for fists, with a forearm too, below 0.3 for rags.
+# Share of the hand that the largest circle in it fills: 0.4 to 0.65 for fists, below 0.3 for rags.
 COMPACT = 0.33
 # A long finger on less than this is a shred of background: fists behind long fingers have 0.21 to 0.33.
 LEAST_PALM = 0.17
 # An arm can hold its tip this far beside the face only if it is stretched sideways, which is a pointing posture whether or
-# not a finger stands out of the blob (a wall of skin colour swallows fingers, and tears others out of a fist).
+# not a finger stands out of the fist (a wall of skin colour swallows fingers, and tears others out of a fist).
 FAR_STRETCHED = 3.2
 FAR_STRETCHED_BELOW_FACE = (0.3, 3.2)
 # Nearer to the face's centre line than this the side is the finger's direction, not the hand's place.
@@ -101,7 +101,7 @@ def _is_held_out(hand: HandShape) -> bool:
 
 
 def _is_fist(hand: HandShape) -> bool:
-    """A compact blob at the height of a pointing hand."""
+    """A compact hand at the height of a pointing hand."""
     highest, lowest = HEIGHTS_BELOW_FACE
     return highest <= hand.centroid[1] <= lowest and math.pi * hand.palm_radius**2 >= COMPACT * hand.area
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from deixis_runtime.camera_lens import CameraLens
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
 from deixis_schemas.messages import Gestures
@@ -12,15 +13,20 @@ from .recognizer import GestureRecognizer
 
 def serve(node: Node, config: GestureConfig) -> None:
     """Answer each Tracks with Gestures until the stage has to stop."""
+    infos = node.subscribe(topics.CAMERA_INFO)
     tracks = node.subscribe(topics.TRACKS)
     out = node.publish(topics.GESTURES)
     recognizer = GestureRecognizer(config)
+    lens = CameraLens(config.horizontal_fov_deg)
     while node.wait():
         seen = tracks.take()
+        lens.hear(infos.take_all())  # after taking the tracks: what the camera said before their frame is then here
+        node.note("lens", lens.note)
         if seen is None:
             continue
         with node.step():
-            gestures = recognizer.update(seen.tracks, seen.width, seen.height, seen.run, seen.stamp_ns)
+            through = lens.of_frame(seen.width, seen.height)
+            gestures = recognizer.update(seen.tracks, seen.width, seen.height, through, seen.run, seen.stamp_ns)
             out.put(Gestures.derive(seen, node.producer, gestures=gestures))
 
 

@@ -15,12 +15,13 @@ class HeadposeConfig(StageConfig):
         default=60.0,
         gt=5,
         lt=170,
-        description="Horizontal field of view of the camera, degrees. It matters little: a head starts as looking into the "
-        "camera, and turns are measured from there.",
+        description="Width of view assumed until camera/info tells the lens, degrees.",
     )
 
+    # The surface that carries the texture, within the outlines of anatomy.py: with 0.160 m a little narrower than the face
+    # with its ears (FACE_WIDTH_M) and than the head with its hair (HEAD_WIDTH_M), neither of which turns with the surface.
     head_semi_axes_m: tuple[float, float, float] = Field(
-        default=(0.080, 0.115, 0.085), description="Semi-axes of the head's ellipsoid: across, up, along, metres."
+        default=(0.080, 0.115, 0.085), description="Semi-axes of the textured ellipsoid: across, up, along, metres."
     )
     surface_points: int = Field(default=600, ge=200, le=10000, description="Points spread over the whole ellipsoid.")
     working_width_px: float = Field(default=64.0, ge=24, le=400, description="Heads wider than this are scaled down, pixels.")
@@ -45,6 +46,6 @@ class HeadposeConfig(StageConfig):
     hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 
-    initial_views: int = Field(default=3, ge=1, le=30, description="Frontal detections that must agree to start a head.")
-    haar_width_m: float = Field(default=0.197, gt=0.05, le=0.5, description="Width of OpenCV's frontal-face box on a head.")
-    haar_drop_m: float = Field(default=0.006, ge=-0.1, le=0.1, description="How far that box's centre lies below the head's.")
+    initial_views: int = Field(
+        default=3, ge=1, le=30, description="Sightings of the face from the front that must agree to start."
+    )

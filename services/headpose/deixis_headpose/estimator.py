@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
+from deixis_runtime.lens import Lens
 from deixis_schemas.messages import HeadPose, Track
 from deixis_schemas.runs import RunClock
 from numpy.typing import NDArray
 
 from .config import HeadposeConfig
-from .head import Camera, ellipsoid
-from .tracked_head import Sight, TrackedHead
+from .head import ellipsoid
+from .tracked_head import Sight, TrackedHead, centre_of
 
 
 class HeadPoseEstimator:
@@ -25,40 +25,35 @@ class HeadPoseEstimator:
         self._heads: dict[int, TrackedHead] = {}
         self._seen_ns: dict[int, int] = {}
 
-    def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], run: int, stamp_ns: int) -> list[HeadPose]:
+    def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], lens: Lens, run: int, stamp_ns: int) -> list[HeadPose]:
         """Estimate the heads of one frame.
 
-        image: (H, W, 3) BGR or (H, W) grey, uint8. tracks: those of the same frame. run: the camera's; another one starts
-        all heads anew. stamp_ns: capture time. Raises ValueError for a picture of another type.
+        image: (H, W, 3) BGR or (H, W) grey, uint8. tracks: those of the same frame. lens: what it was taken through. run:
+        the camera's; another one starts all heads anew. stamp_ns: capture time. Raises ValueError for a picture of another
+        type.
         """
         if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
             raise ValueError(f"image: needs uint8 of shape (H, W, 3) or (H, W), got {image.dtype} {image.shape}")
         moment = self._clock.advance(run, stamp_ns)
-        stamp_ns = moment.now_ns
         if moment.new_run:
             self._heads.clear()
             self._seen_ns.clear()
         faces = _largest_faces(tracks, self._config.max_persons)
-        self._forget(stamp_ns, {face.person_id for face in faces})
-        if not faces:
-            return []
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8) if image.ndim == 3 else image
+        self._forget(moment.now_ns, {face.person_id for face in faces})
         hands = [track for track in tracks if track.kind != "face"]
-        camera = _assumed_camera(image.shape[1], image.shape[0], self._config.horizontal_fov_deg)
-        return [self._estimate(face, hands, grey, camera, stamp_ns) for face in faces]
+        return [self._estimate(face, hands, image, lens, moment.now_ns) for face in faces]
 
-    def _estimate(
-        self, face: Track, hands: Sequence[Track], grey: NDArray[np.uint8], camera: Camera, stamp_ns: int
-    ) -> HeadPose:
+    def _estimate(self, face: Track, hands: Sequence[Track], image: NDArray[np.uint8], lens: Lens, now_ns: int) -> HeadPose:
         person = face.person_id
         assert person is not None
         head = self._heads.setdefault(person, TrackedHead(self._config, self._surface))
-        self._seen_ns[person] = stamp_ns
-        return head.update(Sight(grey, camera, face, hands, stamp_ns)).of_person(person)
+        self._seen_ns[person] = now_ns
+        camera = lens.pinhole_at(centre_of(face), (image.shape[1], image.shape[0]))
+        return head.update(Sight(image, camera, face, hands, now_ns)).of_person(person)
 
-    def _forget(self, stamp_ns: int, present: set[int | None]) -> None:
+    def _forget(self, now_ns: int, present: set[int | None]) -> None:
         for person in [p for p, seen in self._seen_ns.items() if p not in present]:
-            if stamp_ns - self._seen_ns[person] > self._config.forget_s * 1e9:
+            if now_ns - self._seen_ns[person] > self._config.forget_s * 1e9:
                 del self._heads[person], self._seen_ns[person]
 
 
@@ -70,7 +65,3 @@ def _largest_faces(tracks: Sequence[Track], count: int) -> list[Track]:
     for face in faces:
         by_person.setdefault(face.person_id, face)
     return list(by_person.values())[:count]
-
-
-def _assumed_camera(width: int, height: int, fov_deg: float) -> Camera:
-    return Camera(width / 2 / float(np.tan(np.radians(fov_deg / 2))), (width - 1) / 2, (height - 1) / 2)

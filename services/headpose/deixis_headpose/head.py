@@ -14,19 +14,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from deixis_runtime.lens import Pinhole
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 NOSE = np.array([0.0, 0.0, -1.0])
-
-
-class Camera(NamedTuple):
-    """Pinhole camera: focal length and principal point in pixels."""
-
-    focal_px: float
-    centre_x_px: float
-    centre_y_px: float
 
 
 @dataclass(frozen=True)
@@ -132,7 +125,7 @@ class Projection(NamedTuple):
         return np.stack([y * c - z * b, z * a - x * c, x * b - y * a, a, b, c], axis=1)
 
 
-def project(surface: Surface, pose: Pose, camera: Camera, least_facing: float = 0.0) -> Projection:
+def project(surface: Surface, pose: Pose, camera: Pinhole, least_facing: float = 0.0) -> Projection:
     """Project the points of a posed head whose normals face the camera by a cosine above `least_facing`."""
     place, normals = pose.position_m, surface.normals @ pose.rotation.T
     offsets = surface.points_m @ pose.rotation.T

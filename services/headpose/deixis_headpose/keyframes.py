@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from deixis_runtime.lens import Pinhole
 
-from .head import Array, Camera, Pose, Surface, angle_between
+from .head import Array, Pose, Surface, angle_between
 from .lsm import Template, observe, template_of
 from .patch import Level
 
@@ -26,7 +27,7 @@ class Keyframe:
     templates: tuple[Template, ...]
 
 
-def take_keyframe(levels: Sequence[Level], surface: Surface, pose: Pose, camera: Camera) -> Keyframe:
+def take_keyframe(levels: Sequence[Level], surface: Surface, pose: Pose, camera: Pinhole) -> Keyframe:
     """Read the head's texture from a picture at a known pose."""
     views = (observe(level, surface, pose, camera) for level in levels)
     return Keyframe(pose, pose.seen(), tuple(template_of(view, len(surface.points_m)) for view in views))

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from deixis_runtime.lens import Pinhole
 
-from .head import Array, Camera, Pose, Projection, Surface, project
+from .head import Array, Pose, Projection, Surface, project
 from .patch import Level
 
 HUBER = 1.345
@@ -58,11 +59,9 @@ class Match(NamedTuple):
     pose: Pose
     correlation: float
     """Not robustly weighted: the weighted one always reads about 1 (PERCEPTION.md)."""
-    covariance: Array
-    """(6, 6) of the pose step, formal: residual variance by (A'PA)^-1."""
 
 
-def observe(level: Level, surface: Surface, pose: Pose, camera: Camera) -> Observation:
+def observe(level: Level, surface: Surface, pose: Pose, camera: Pinhole) -> Observation:
     """Sample the picture at all surface points; weights fall off toward the outline (the paper: toward the patch border)."""
     projection = project(surface, pose, camera, LEAST_FACING)
     values, gradients, inside = level.sample(projection.pixels)
@@ -94,7 +93,7 @@ def match(
     surface: Surface,
     templates: Sequence[Template],
     start: Pose,
-    camera: Camera,
+    camera: Pinhole,
     prior: Prior,
     iterations: int,
 ) -> Match:
@@ -103,25 +102,21 @@ def match(
     prior: where the pose is expected, as a step from `start`; it keeps badly seen parameters calm.
     """
     pose, travelled = start, np.zeros(6)
-    covariance = np.asarray(np.linalg.inv(prior.information), np.float64)
     observation = observe(level, surface, pose, camera)
     for _ in range(iterations):
-        solved = _solve(observation, templates, prior, travelled)
-        if solved is None:
+        step = _solve(observation, templates, prior, travelled)
+        if step is None:
             break
-        step, covariance = solved
         step = _bounded(step)
         pose, travelled = pose.moved(step), travelled + step
         observation = observe(level, surface, pose, camera)
         if _is_small(step, pose, camera, level):
             break
-    return Match(pose, correlation(observation, templates), covariance)
+    return Match(pose, correlation(observation, templates))
 
 
-def _solve(
-    observation: Observation, templates: Sequence[Template], prior: Prior, travelled: Array
-) -> tuple[Array, Array] | None:
-    """One linearised solution: pose step (6,) and its covariance (6, 6); none where too few points are seen."""
+def _solve(observation: Observation, templates: Sequence[Template], prior: Prior, travelled: Array) -> Array | None:
+    """One linearised solution: the pose step (6,); none where too few points are seen."""
     by_pose = observation.projection.by_pose(observation.gradients)
     normal, right = np.zeros((6, 6)), np.zeros(6)
     for template in templates:
@@ -136,8 +131,7 @@ def _solve(
         return None
     normal = INDEPENDENT * normal + prior.information
     right = INDEPENDENT * right + prior.right - prior.information @ travelled
-    inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-    return inverse @ right, inverse
+    return np.asarray(np.linalg.solve(normal, right), np.float64)
 
 
 def _pose_equations(by_pose: Array, f: Array, g: Array, weights: Array) -> tuple[Array, Array]:
@@ -183,6 +177,6 @@ def _bounded(step: Array) -> Array:
     return np.asarray(step / max(1.0, turn / np.radians(20), shift / 0.04))
 
 
-def _is_small(step: Array, pose: Pose, camera: Camera, level: Level) -> bool:
+def _is_small(step: Array, pose: Pose, camera: Pinhole, level: Level) -> bool:
     pixels = float(np.linalg.norm(step[3:5])) * camera.focal_px / pose.position_m[2] * level.scale
     return pixels < 0.03 and bool(np.linalg.norm(step[:3]) < np.radians(0.15))

@@ -16,9 +16,11 @@ LEVER_M = 0.032
 SIGMA_M = np.array([0.022, 0.02, 0.004])
 """How well the neck's place is known: across, up, along the line of sight."""
 TURN_SIGMA = np.radians([25.0, 60.0, 25.0])
-"""Turn from one frame to the next about x, y, z: wide, for a prior on the yaw shortens fast turns."""
-FOLLOW, FOLLOW_SPEED = 0.2, 0.025
-"""Gains of the constant-velocity filter of the neck, per frame at 30 frames a second."""
+"""Turn from the start of a matching about x, y, z: wide, for a prior on the yaw shortens fast turns."""
+FOLLOW_PER_S, FOLLOW_SPEED_PER_S = 6.0, 0.75
+"""Gains of the constant-velocity filter of the neck: shares of the error that go into place and speed, per second."""
+LEAST_GAP_S, LARGEST_GAP_S = 1 / 150, 0.2
+"""Matches nearer and farther apart than this are followed as if they were this far apart."""
 
 
 class Neck:
@@ -41,11 +43,11 @@ class Neck:
 
     def update(self, pose: Pose, dt: float) -> None:
         """Follow a matched pose, `dt` seconds after the last."""
-        frames = min(max(dt * 30, 0.2), 6.0)
+        gap = min(max(dt, LEAST_GAP_S), LARGEST_GAP_S)
         self._place = self._place + self._speed * dt
         error = pose.position_m - _lever(pose) - self._place
-        self._place = self._place + min(1.0, FOLLOW * frames) * error
-        self._speed = self._speed + min(1.0, FOLLOW_SPEED * frames) * error / dt if dt > 0 else self._speed
+        self._place = self._place + min(1.0, FOLLOW_PER_S * gap) * error
+        self._speed = self._speed + min(1.0, FOLLOW_SPEED_PER_S * gap) * error / dt if dt > 0 else self._speed
 
     def rest(self) -> None:
         """Expect no further motion, as when the head is not matched."""

@@ -7,30 +7,28 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from deixis_schemas.messages import HeadPose, PoseStatus, Side, Track
+from deixis_runtime.lens import Pinhole
+from deixis_schemas.messages import HeadPose, Point, PoseStatus, Side, Track
 from numpy.typing import NDArray
 
 from .config import HeadposeConfig
-from .head import Array, Camera, Pose, Surface, facing_camera, rotation_of
-from .initialise import Initialiser, find_frontal_face, frontal_pose
+from .head import Array, Pose, Surface, facing_camera, rotation_of
+from .initialise import Initialiser, frontal_pose
 from .keyframes import Keyframes, take_keyframe
 from .lsm import Match, correlation, match, observe
 from .neck import Neck
 from .patch import Level, pyramid
-from .uncertainty import yaw_sigma_deg
 
 SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
 MOVED_ON_S = 0.3
 """A head not matched for so long may be anywhere near its track."""
-PATIENCE = 15
-"""Frames in which a new head is asked for its frontal face; after these, every third frame, for many never show it."""
 WALKING_M_S = 0.4
 """Slower heads stand."""
-DOUBT_EVERY = 3
-"""The frontal-face detector costs several matchings, so it is asked in every third frame of doubt."""
 STILL_TURN, STILL_SHIFT_M = np.radians(1.0), 0.002
-"""A head that moved less than this in the last frame is matched on the finest level only."""
+"""A head expected this near to where it was last is within the reach of the finest level, and matched on it alone."""
+HAND_NEAR = (0.39, 0.33)
+"""Keyframes are taken while hands are farther than this from the face's box, across and down, face widths."""
 SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 """Turns tried about the vertical where the predicted pose does not match."""
 
@@ -38,11 +36,11 @@ SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 class Sight(NamedTuple):
     """What one frame shows of one person."""
 
-    grey: NDArray[np.uint8]
-    camera: Camera
+    picture: NDArray[np.uint8]
+    camera: Pinhole
     face: Track
     hands: Sequence[Track]
-    stamp_ns: int
+    now_ns: int
 
 
 @dataclass(frozen=True)
@@ -77,17 +75,13 @@ class TrackedHead:
         self._neck: Neck | None = None
         self._velocity: Array = np.zeros(6)
         self._matched_ns = 0
-        self._doubts = 0
         self._gone: Side | None = None
-        self._asked = 0
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
         if self._pose is None or self._neck is None:
-            self._asked += 1
-            hidden = self._asked > PATIENCE and self._asked % DOUBT_EVERY
-            return HeadState("initialising") if hidden else self._initialise(sight)
-        dt = (sight.stamp_ns - self._matched_ns) * 1e-9
+            return self._initialise(sight)
+        dt = (sight.now_ns - self._matched_ns) * 1e-9
         found = self._match(sight, self._pose, self._neck, dt)
         if found is not None:
             self._accept(sight, found, self._pose, dt)
@@ -97,23 +91,20 @@ class TrackedHead:
     # --- start -----------------------------------------------------------------------------------------------------
 
     def _initialise(self, sight: Sight) -> HeadState:
-        x, y, width, height = sight.face.bbox_px
-        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
-        face = find_frontal_face(sight.grey, centre, width)
-        agreed = self._initialiser.update(face, centre)
+        agreed = self._initialiser.update(sight.face.frontal, centre_of(sight.face), sight.now_ns)
         if agreed is None:
             return HeadState("initialising")
-        pose = frontal_pose(agreed, sight.camera, self._config.haar_width_m, self._config.haar_drop_m)
-        unseen_s = (sight.stamp_ns - self._matched_ns) * 1e-9
+        pose = frontal_pose(agreed, sight.camera)
+        unseen_s = (sight.now_ns - self._matched_ns) * 1e-9
         if self._pose is not None and unseen_s < MOVED_ON_S and not _same_place(pose, self._pose):
             return HeadState("initialising")
         levels = self._levels(sight, pose)
         self._keyframes = Keyframes(self._config.keyframe_spacing_deg, self._config.keyframe_limit)
         self._keyframes.add(take_keyframe(levels, self._surface, pose, sight.camera))
-        self._doubts, self._gone = 0, None
+        self._gone = None
         self._velocity = np.concatenate([np.zeros(3), self._walking_speed(sight, pose)])
         self._initialiser = Initialiser(self._config.initial_views)
-        self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.stamp_ns
+        self._pose, self._correlation, self._matched_ns = pose, 1.0, sight.now_ns
         self._neck = Neck(pose, self._walking_speed(sight, pose))
         return self._state(held_s=0.0)
 
@@ -130,10 +121,7 @@ class TrackedHead:
         """Start anew where the head is thought far away or lost and yet frontal faces are seen; else none."""
         assert self._pose is not None
         if state.status == "tracking" and abs(self._pose.angles_deg()[0]) < self._config.doubt_deg:
-            self._doubts, self._initialiser = 0, Initialiser(self._config.initial_views)
-            return None
-        self._doubts += 1
-        if self._doubts % DOUBT_EVERY:
+            self._initialiser = Initialiser(self._config.initial_views)
             return None
         again = self._initialise(sight)
         return None if again.status == "initialising" else again
@@ -159,7 +147,7 @@ class TrackedHead:
         best = max(found, other, key=lambda m: m.correlation)
         return best if best.correlation >= self._config.gate else None
 
-    def _best_start(self, levels: Sequence[Level], starts: Sequence[Pose], camera: Camera) -> Pose:
+    def _best_start(self, levels: Sequence[Level], starts: Sequence[Pose], camera: Pinhole) -> Pose:
         """The start at which the keyframes correlate best on the coarsest level."""
         scores = []
         for start in starts:
@@ -167,9 +155,9 @@ class TrackedHead:
             scores.append(correlation(observe(levels[-1], self._surface, start, camera), templates))
         return starts[int(np.argmax(scores))]
 
-    def _refine(self, levels: Sequence[Level], start: Pose, camera: Camera, neck: Neck, dt: float) -> Match:
+    def _refine(self, levels: Sequence[Level], start: Pose, camera: Pinhole, neck: Neck, dt: float) -> Match:
         """Match from the coarsest level to the finest, each with the keyframes nearest to the pose so far."""
-        found = Match(start, -1.0, np.zeros((6, 6)))
+        found = Match(start, -1.0)
         for k in reversed(range(len(levels))):
             views = self._keyframes.nearest(found.pose, self._config.templates)
             templates = [view.templates[k] for view in views]
@@ -183,7 +171,7 @@ class TrackedHead:
         camera = sight.camera
         centre = (camera.focal_px * x / z + camera.centre_x_px, camera.focal_px * y / z + camera.centre_y_px)
         width = 2 * self._config.head_semi_axes_m[0] * camera.focal_px / z
-        return pyramid(sight.grey, centre, width, self._config.working_width_px, self._config.pyramid_levels)
+        return pyramid(sight.picture, centre, width, self._config.working_width_px, self._config.pyramid_levels)
 
     # --- after the match -------------------------------------------------------------------------------------------
 
@@ -191,7 +179,7 @@ class TrackedHead:
         self._velocity = found.pose.step_from(last) / max(dt, 1e-3)
         if self._neck is not None:
             self._neck.update(found.pose, dt)
-        self._pose, self._correlation, self._matched_ns = found.pose, found.correlation, sight.stamp_ns
+        self._pose, self._correlation, self._matched_ns = found.pose, found.correlation, sight.now_ns
         if found.correlation >= self._config.keyframe_gate and not _hand_near(sight) and self._keyframes.wants(found.pose):
             levels = self._levels(sight, found.pose)
             self._keyframes.add(take_keyframe(levels, self._surface, found.pose, sight.camera))
@@ -220,6 +208,22 @@ class TrackedHead:
         return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
 
 
+def centre_of(face: Track) -> Point:
+    """Centre of a face's box, which is the head's (pixel coordinates)."""
+    x, y, width, height = face.bbox_px
+    return x + (width - 1) / 2, y + (height - 1) / 2
+
+
+def yaw_sigma_deg(yaw_deg: float, correlation: float, held_s: float) -> float:
+    """Standard deviation of the yaw, degrees: a model fitted to measured errors.
+
+    It grows with the turn, as the head's size is not known exactly, and beyond 60 degrees with the number of keyframes that
+    the turn was chained over. A weak match adds to it; so does every second that the pose is held without one.
+    """
+    turn = abs(yaw_deg)
+    return 1.2 + 0.05 * turn + 0.15 * max(0.0, turn - 60.0) + 10 * max(0.0, 0.95 - correlation) + 60 * held_s
+
+
 def turned(pose: Pose, turn_deg: float) -> Pose:
     """The pose with the head turned about its own vertical, toward image right."""
     facing = facing_camera(pose.position_m)
@@ -227,7 +231,7 @@ def turned(pose: Pose, turn_deg: float) -> Pose:
 
 
 def _same_place(one: Pose, other: Pose) -> bool:
-    """Whether two poses can be of one head: the frontal-face detector also fires on walls beside a profile."""
+    """Whether two poses can be of one head: frontal faces are also seen in walls beside a profile."""
     scale = other.position_m[2] / one.position_m[2]
     shift = np.linalg.norm(one.position_m[:2] * scale - other.position_m[:2])
     return bool(shift < SAME_PLACE_M and 0.75 < scale < 1.33)
@@ -238,8 +242,8 @@ def _side(yaw_deg: float) -> Side:
 
 
 def _hand_near(sight: Sight) -> bool:
-    """Whether a hand's box comes within 0.3 face widths of the face's: keyframes must not learn hands."""
+    """Whether a hand's box comes near the face's: keyframes must not learn hands."""
     x, y, w, h = sight.face.bbox_px
-    gap = 0.3 * w
+    across, down = HAND_NEAR[0] * w, HAND_NEAR[1] * w
     boxes = [hand.bbox_px for hand in sight.hands]
-    return any(a < x + w + gap and x < a + c + gap and b < y + h + gap and y < b + d + gap for a, b, c, d in boxes)
+    return any(a < x + w + across and x < a + c + across and b < y + h + down and y < b + d + down for a, b, c, d in boxes)

@@ -1,0 +1,39 @@
+"""The lens that frames are seen through: the camera's, as last told in `camera/info`; until then an assumed one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from deixis_schemas.messages import CameraInfo
+
+from .lens import Lens, LensError
+
+
+class CameraLens:
+    """Keeps the newest intrinsics of a camera; before there are any, a pinhole of `horizontal_fov_deg` stands in."""
+
+    def __init__(self, horizontal_fov_deg: float) -> None:
+        self._fov_deg = horizontal_fov_deg
+        self._told: Lens | None = None
+
+    def hear(self, infos: Iterable[CameraInfo]) -> None:
+        """Take what the camera says of itself, oldest first.
+
+        A camera that has no intrinsics yet, as when it starts anew, takes back none: no frame of it is there to be misread.
+        """
+        for info in infos:
+            try:
+                self._told = Lens.of(info)
+            except LensError:
+                continue
+
+    def of_frame(self, width: int, height: int) -> Lens:
+        """The lens to read pictures of that size with."""
+        return self._told or Lens.assumed(width, height, self._fov_deg)
+
+    @property
+    def note(self) -> str | None:
+        """For the stage's health: why the lens is only assumed; none once the camera has told it."""
+        if self._told is not None:
+            return None
+        return f"no intrinsics from camera/info yet: a lens {self._fov_deg:g} degrees wide is assumed"
