@@ -339,6 +339,40 @@ def test_a_misspelt_field_of_the_mount_stops_the_stage_and_is_named(endpoint: st
         assert "settings of camera: mount.pitch_deg: " in camera.said
 
 
+@contextlib.contextmanager
+def web_server(folder: Path, port: int = 0) -> Iterator[int]:
+    """Files of a folder by HTTP on loopback; gives the port."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(folder))
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield int(server.server_address[1])
+        server.shutdown()
+
+
+def test_a_web_film_that_is_lost_and_comes_back_starts_at_0_in_a_new_run(endpoint: str, tmp_path: Path) -> None:
+    write_film(tmp_path / "film.mp4", frames=15)
+    with contextlib.ExitStack() as first_life:
+        port = first_life.enter_context(web_server(tmp_path))
+        arguments = ("--set", f"source=http://127.0.0.1:{port}/film.mp4", "--set", "loop=true", "--set", "retry_longest_s=0.5")
+        with camera_and_watcher(endpoint, tmp_path, *arguments) as (_, watcher):
+            wait_for(lambda: len(watcher.frames) > 2, "frames")
+            first_life.close()
+            wait_for(lambda: watcher.state() == "retrying", "the loss")
+            lost = watcher.infos[-1].run
+            with web_server(tmp_path, port):
+                wait_for(lambda: watcher.frames[-1].run > lost, "frames anew")
+            again = next(frame for frame in watcher.frames if frame.run > lost)
+            assert (again.run, again.seq) == (lost + 1, 0)
+
+
 @pytest.fixture
 def hanging_camera() -> Iterator[str]:
     """URL of an IP camera that sends a second of pictures and then nothing, with the line open."""

@@ -25,7 +25,7 @@ HEALTH: dict[str, HealthState] = {"retrying": "degraded", "failed": "failed"}
 
 
 class CameraStage:
-    """The loop thread's side of the camera. Everything that touches the node happens here."""
+    """The loop thread's side of the camera. Everything that touches the node happens here; `handoff` brings what to publish."""
 
     def __init__(self, node: Node, config: CameraConfig) -> None:
         self._node = node
@@ -34,7 +34,7 @@ class CameraStage:
         self._infos = node.publish(topics.CAMERA_INFO)
         self._beliefs = node.subscribe(topics.BELIEF, depth=8) if node.lockstep else None
         self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, node.lockstep)
-        self._handoff = Handoff()
+        self.handoff = Handoff()
         self._lockstep = Lockstep(config.lockstep_timeout_s)
         self._live = False
         self._started = False
@@ -52,7 +52,7 @@ class CameraStage:
         capture = self._start_capture()
         try:
             while self._node.wait(timeout_s=self._next_s()):
-                self._step()
+                self.step()
         finally:
             if capture is not None:
                 capture.stop(STOP_WAIT_S)
@@ -70,7 +70,7 @@ class CameraStage:
         capture = Capture(
             self._config,
             calibration,
-            self._handoff,
+            self.handoff,
             first_run=first_run(node),
             lockstep=node.lockstep,
             wake=node.wake,
@@ -87,18 +87,19 @@ class CameraStage:
 
     # --- each turn of the loop ----------------------------------------------------------------------------------------
 
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One turn of the loop: apply what the capture thread reported, and publish what is due."""
         self._take_answers()
         self._hold_s = INFO_PERIOD_S
-        item = self._handoff.first()
+        item = self.handoff.first()
         while item is not None and not isinstance(item, Ready):
-            self._handoff.take(item)
+            self.handoff.take(item)
             self._apply(item)
-            item = self._handoff.first()
+            item = self.handoff.first()
         if isinstance(item, Ready):
             self._handle(item)
         self._watch_for_stall()
-        overwritten = self._handoff.take_overwritten()
+        overwritten = self.handoff.take_overwritten()
         if overwritten:
             self._node.count("pictures_overwritten", overwritten)
         self._publish_info()
@@ -123,12 +124,12 @@ class CameraStage:
             self._play(picture)
 
     def _play(self, picture: Ready) -> None:
-        decision = self._own_rate.decide(picture.time_ns, self._monotonic_ns(), self._handoff.waiting_pictures() > 1)
+        decision = self._own_rate.decide(picture.time_ns, self._monotonic_ns(), self.handoff.waiting_pictures() > 1)
         if decision.act == "wait":
             self._hold_s = decision.wait_s
         elif decision.act == "drop":
             self._node.count("pictures_skipped")
-            self._handoff.take(picture)
+            self.handoff.take(picture)
             self._hold_s = 0.0
         else:
             if decision.fell_behind:
@@ -153,7 +154,7 @@ class CameraStage:
     def _publish(self, picture: Ready, stamp_ns: int) -> None:
         """Publish the picture, unless a newer live one has come in its place meanwhile."""
         self._hold_s = 0.0
-        if not self._handoff.take(picture):
+        if not self.handoff.take(picture):
             return
         encoded, producer = picture.encoded, self._node.producer
         with self._node.step():
