@@ -65,8 +65,8 @@ def run(
         config,
         calibration or AssumedFieldOfView(60.0),
         handoff,
+        FIRST_RUN,
         lockstep=lockstep,
-        first_run=FIRST_RUN,
         wake=lambda: None,
         log=logging.getLogger("test"),
     )

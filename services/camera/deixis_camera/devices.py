@@ -36,11 +36,8 @@ class Device:
         if cause:
             raise SourceLost(f"camera '{self._path}' {cause}")
         capture = cv2.VideoCapture(self._path, cv2.CAP_V4L2)
-        if not capture.isOpened():
-            capture.release()
-            raise SourceLost(f"camera '{self._path}' {why_no_pictures(self._path)}")
         self._ask_for_settings(capture)
-        if not any(capture.grab() for _ in range(WARM_UP_READS)):
+        if not any(capture.grab() for _ in range(WARM_UP_READS)):  # nor does one that could not be opened
             capture.release()
             raise SourceLost(f"camera '{self._path}' {why_no_pictures(self._path)}")
         self._capture = capture

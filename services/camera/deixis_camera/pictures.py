@@ -39,27 +39,20 @@ class Preparation:
         self._calibration = calibration
         self._note = note
         self._normaliser = Normaliser(config.max_width)
-        self._intrinsics: dict[tuple[int, int], Intrinsics] = {}
         self._notes: dict[str, str] = {}
 
     def prepare(self, image: Image) -> tuple[Encoded, Intrinsics]:
         """The picture as it is published, and how it projects. Raises PictureRefused."""
         pixels = self._normaliser.normalise(image)
-        intrinsics = self._intrinsics_for((pixels.shape[1], pixels.shape[0]))
+        try:
+            intrinsics = self._calibration.for_size(pixels.shape[1], pixels.shape[0])
+        except CalibrationError as error:
+            raise PictureRefused(str(error)) from None
         if pixels.shape[:2] != image.shape[:2]:
             self._note_change("scaled", f"pictures of {_size(image)} are scaled down to {_size(pixels)}")
         if self._normaliser.deep:
             self._note_change("depth", f"16-bit pictures are taken as {self._normaliser.bits}-bit and published as 8-bit")
         return encode(pixels, self._config.encoding, self._config.quality), intrinsics
-
-    def _intrinsics_for(self, size: tuple[int, int]) -> Intrinsics:
-        if size not in self._intrinsics:
-            try:
-                found = self._calibration.for_size(*size)
-            except CalibrationError as error:
-                raise PictureRefused(str(error)) from None
-            self._intrinsics = {size: found}  # one size is the rule; of a folder of many only the last is kept
-        return self._intrinsics[size]
 
     def _note_change(self, key: str, text: str) -> None:
         if self._notes.get(key) != text:

@@ -68,13 +68,7 @@ class CameraStage:
             return None
         node = self._node
         capture = Capture(
-            self._config,
-            calibration,
-            self.handoff,
-            first_run=first_run(node),
-            lockstep=node.lockstep,
-            wake=node.wake,
-            log=node.log,
+            self._config, calibration, self.handoff, first_run(node), lockstep=node.lockstep, wake=node.wake, log=node.log
         )
         capture.start()
         return capture
@@ -278,4 +272,4 @@ def serve(node: Node, config: CameraConfig) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Console script `deixis-camera`."""
-    return run_stage("camera", CameraConfig, serve, argv)
+    return run_stage("camera", CameraConfig, serve, argv, "Devices, files and streams to frames.")
