@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import math
 import os
 import struct
 import subprocess
@@ -13,7 +14,8 @@ import numpy as np
 import pytest
 from deixis_camera import devices
 from deixis_camera.config import CameraConfig
-from deixis_camera.devices import VIDIOC_QUERYCAP, VIDIOC_REQBUFS, Device, why_no_pictures, why_not_openable
+from deixis_camera.devices import Device, captured_ns
+from deixis_camera.diagnosis import VIDIOC_QUERYCAP, VIDIOC_REQBUFS, why_no_pictures, why_not_openable
 from deixis_camera.sources import SourceLost
 
 
@@ -38,31 +40,40 @@ def pretend_v4l(monkeypatch: pytest.MonkeyPatch, capabilities: int, refusal: int
     monkeypatch.setattr(fcntl, "ioctl", ioctl)
 
 
-class FakeCapture:
-    """Stands in for cv2.VideoCapture on a V4L2 device: `pictures` of them, then none."""
+MS = 1_000_000
 
-    def __init__(self, pictures: int, opened: bool = True) -> None:
+
+class FakeCapture:
+    """Stands in for cv2.VideoCapture on a V4L2 device: grabs `pictures`, the first while it is opened, then none.
+
+    Its clock stands at `now_ns`: a period passes until each picture is there, and decoding one takes 50 ms. The driver stamps
+    a buffer by that clock `buffered_ms` earlier, or with 0 where it does not know the time.
+    """
+
+    def __init__(self, pictures: int, buffered_ms: float | None = None) -> None:
         self.left = pictures
-        self.opened = opened
+        self.now_ns = 5_000 * MS
+        self.buffered_ms = buffered_ms
+        self.stamp_ms = 0.0
         self.released = False
         self.settings: dict[int, float] = {}
-
-    def isOpened(self) -> bool:
-        return self.opened
 
     def set(self, name: int, value: float) -> bool:
         self.settings[name] = value
         return True
 
     def get(self, name: int) -> float:
-        return self.settings.get(name, 30.0)
+        return self.stamp_ms if name == cv2.CAP_PROP_POS_MSEC else self.settings.get(name, 30.0)
 
     def grab(self) -> bool:
-        return self.left > 0
-
-    def read(self) -> tuple[bool, np.ndarray | None]:
         self.left -= 1
-        return (True, np.zeros((480, 640, 3), np.uint8)) if self.left >= 0 else (False, None)
+        self.now_ns += 33 * MS
+        self.stamp_ms = 0.0 if self.buffered_ms is None else self.now_ns / MS - self.buffered_ms
+        return self.left >= 0
+
+    def retrieve(self) -> tuple[bool, np.ndarray | None]:
+        self.now_ns += 50 * MS
+        return True, np.zeros((480, 640, 3), np.uint8)
 
     def release(self) -> None:
         self.released = True
@@ -72,48 +83,69 @@ def with_capture(monkeypatch: pytest.MonkeyPatch, capture: FakeCapture) -> None:
     monkeypatch.setattr(devices, "cv2", SimpleNamespace(**vars(cv2) | {"VideoCapture": lambda *_: capture}))
 
 
-def test_a_camera_is_asked_for_its_settings_and_its_pictures_carry_their_arrival(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "video0"
+def opened_device(folder: Path, monkeypatch: pytest.MonkeyPatch, capture: FakeCapture, **settings: object) -> Device:
+    path = folder / "video0"
     path.touch()
-    capture = FakeCapture(pictures=3)
     with_capture(monkeypatch, capture)
-    clock = iter([100, 133, 166])
-    config = CameraConfig(width=1280, height=720, rate_hz=15, pixel_format="MJPG")
-    device = Device(str(path), config, lambda: next(clock))
+    device = Device(str(path), CameraConfig.model_validate(settings), lambda: capture.now_ns)
     device.open()
+    return device
+
+
+def test_a_camera_is_asked_for_its_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    capture = FakeCapture(pictures=1)
+    device = opened_device(tmp_path, monkeypatch, capture, width=1280, height=720, rate_hz=15, pixel_format="MJPG")
     asked = capture.settings
     assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT], device.rate_hz) == (1280, 720, 15.0)
     assert asked[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"MJPG")
-    assert [(picture.seq, picture.time_ns) for picture in (device.read(), device.read(), device.read())] == [
-        (0, 100), (1, 133), (2, 166),
-    ]  # fmt: skip
+
+
+def test_a_picture_carries_the_time_of_its_capture_by_the_driver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    capture = FakeCapture(pictures=3, buffered_ms=120.0)
+    device = opened_device(tmp_path, monkeypatch, capture)
+    for seq in range(2):
+        picture = device.read()
+        assert (picture.seq, picture.time_ns) == (seq, capture.now_ns - 170 * MS), "120 ms in the queue and 50 of decoding ago"
+
+
+def test_decoding_time_is_not_in_the_time_of_a_camera_whose_driver_gives_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = FakeCapture(pictures=2)
+    device = opened_device(tmp_path, monkeypatch, capture)
+    assert device.read().time_ns == capture.now_ns - 50 * MS
+
+
+@pytest.mark.parametrize(
+    ("buffer_ms", "captured_ms"),
+    [
+        (9_990.0, 9_990), (8_000.0, 8_000), (10_000.0, 10_000),
+        (7_999.0, 10_000), (0.0, 10_000), (10_001.0, 10_000), (1.7e12, 10_000), (-1.0, 10_000), (math.nan, 10_000),
+    ],
+)  # fmt: skip
+def test_a_buffer_time_that_is_not_of_the_last_two_seconds_is_not_believed(buffer_ms: float, captured_ms: int) -> None:
+    assert captured_ns(buffer_ms, 10_000 * MS) == captured_ms * MS
 
 
 def test_a_camera_unplugged_while_it_streams_is_lost_and_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "video0"
-    path.touch()
-    capture = FakeCapture(pictures=1)
-    with_capture(monkeypatch, capture)
-    device = Device(str(path), CameraConfig(), lambda: 0)
-    device.open()
+    capture = FakeCapture(pictures=2)
+    device = opened_device(tmp_path, monkeypatch, capture)
     device.read()
     with pytest.raises(SourceLost, match="stopped giving pictures"):
         device.read()
-    path.unlink()
+    (tmp_path / "video0").unlink()
     with pytest.raises(SourceLost, match="is not there"):
         device.read()
     device.close()
     assert capture.released
 
 
-@pytest.mark.parametrize("capture", [FakeCapture(0), FakeCapture(0, opened=False)])
 def test_a_camera_that_opens_but_gives_nothing_is_given_back_before_the_next_try(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capture: FakeCapture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "video0"
     path.touch()
+    capture = FakeCapture(pictures=0)
     with_capture(monkeypatch, capture)
     pretend_v4l(monkeypatch, capabilities=0x1, refusal=errno.EBUSY)
     assert "is busy: another program uses it" in open_device(str(path))

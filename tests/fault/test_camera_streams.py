@@ -7,13 +7,15 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
+from deixis_camera import videos
 from deixis_camera.config import CameraConfig
 from deixis_camera.sources import SourceLost, SourceRefused
-from deixis_camera.streams import Stream
+from deixis_camera.videos import Stream
 
 CONFIG = CameraConfig(open_timeout_s=3, read_timeout_s=1)
 
@@ -106,11 +108,15 @@ def read_until_lost(stream: Stream) -> tuple[list[int], str]:
     return seqs, ""
 
 
-def test_a_film_on_a_web_server_is_a_recording_with_media_time(tmp_path: Path) -> None:
-    writer = cv2.VideoWriter(str(tmp_path / "film.mp4"), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 25.0, (160, 120))
+def write_film(path: Path) -> None:
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 25.0, (160, 120))
     for index in range(10):
         writer.write(np.full((120, 160, 3), 20 * index, np.uint8))
     writer.release()
+
+
+def test_a_film_on_a_web_server_is_a_recording_with_media_time(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.mp4")
     with serving(functools.partial(Quiet, directory=str(tmp_path))) as port:
         stream = Stream(f"http://127.0.0.1:{port}/film.mp4", CONFIG, lambda: 0)
         stream.open()
@@ -131,6 +137,23 @@ def test_an_ip_camera_is_live_and_its_pictures_carry_the_time_of_their_arrival()
         stream.close()
     assert stream.live
     assert [(p.seq, p.time_ns) for p in pictures if p is not None] == [(i, 1000 + i) for i in range(5)]
+
+
+def test_the_conversion_of_a_picture_is_not_in_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SimpleNamespace(now_ns=0)
+
+    class SlowCapture(cv2.VideoCapture):
+        def retrieve(self, *arguments: object) -> object:
+            clock.now_ns += 50_000_000
+            return super().retrieve(*arguments)
+
+    monkeypatch.setattr(videos, "cv2", SimpleNamespace(**vars(cv2) | {"VideoCapture": SlowCapture}))
+    with serving(mjpeg_handler(8)) as port:
+        stream = Stream(f"http://127.0.0.1:{port}/video", CONFIG, lambda: clock.now_ns)
+        stream.open()
+        pictures = [stream.read() for _ in range(3)]
+        stream.close()
+    assert [p.time_ns for p in pictures if p is not None] == [0, 50_000_000, 100_000_000]
 
 
 def test_a_stream_that_ends_is_lost_and_counts_on_when_it_comes_back() -> None:

@@ -19,8 +19,9 @@ import numpy as np
 import pytest
 import zenoh
 from deixis_runtime.session import open_client
+from deixis_runtime.settings import STARTED_BEFORE
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import Belief, CameraInfo, Frame, Health, Producer
+from deixis_schemas.messages import Belief, CameraInfo, Frame, FrameId, Health, Producer
 
 STAGES_BUT_CAMERA = ("tracker", "headpose", "gesture", "fusion")
 PATIENCE_S = 20.0
@@ -85,15 +86,22 @@ class Watcher:
 
     def at_end(self) -> bool:
         """The camera said that it ended, and its last frame is here: the word, more urgent, may overtake it."""
-        return self.state() == "ended" and bool(self.frames) and self.frames[-1].seq == self.infos[-1].last_seq
+        return self.state() == "ended" and bool(self.frames) and self.frames[-1].frame_id == self.said_last()
+
+    def said_last(self) -> FrameId:
+        """The frame that CameraInfo names as the last."""
+        return FrameId(self.infos[-1].run, self.infos[-1].last_seq)
 
     def get(self, key: str) -> list[dict[str, Any]]:
         """Replies to a get, as JSON."""
         replies = self.session.get(f"{key}?format=json", timeout=5.0)
         return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None]
 
-    def digest(self) -> list[tuple[int, int, str]]:
-        return [(frame.seq, frame.stamp_ns, hashlib.sha256(frame.data).hexdigest()) for frame in self.frames]
+    def frame_ids(self) -> list[FrameId]:
+        return [frame.frame_id for frame in self.frames]
+
+    def digest(self) -> list[tuple[int, int, int, str]]:
+        return [(frame.run, frame.seq, frame.stamp_ns, hashlib.sha256(frame.data).hexdigest()) for frame in self.frames]
 
     def _frame(self, sample: zenoh.Sample) -> None:
         frame = codec.decode(Frame, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topics.FRAME.max_bytes)
@@ -115,12 +123,12 @@ class Watcher:
 class Camera:
     """A camera process; `said` is its standard error."""
 
-    def __init__(self, endpoint: str, robot: str, log: Path, *arguments: str) -> None:
+    def __init__(self, endpoint: str, robot: str, log: Path, *arguments: str, environment: dict[str, str]) -> None:
         script = Path(sys.executable).parent / "deixis-camera"
         command = [str(script), "--robot", robot, "--connect", endpoint, *arguments]
         self._log = log
         with log.open("wb") as file:
-            self.process = subprocess.Popen(command, stderr=file, env={**os.environ, "DEIXIS_LOG": "INFO"})
+            self.process = subprocess.Popen(command, stderr=file, env={**os.environ, "DEIXIS_LOG": "INFO", **environment})
 
     @property
     def said(self) -> str:
@@ -136,12 +144,17 @@ class Camera:
 
 @contextlib.contextmanager
 def camera_and_watcher(
-    endpoint: str, folder: Path, *arguments: str, answers: bool = False, stages: tuple[str, ...] = ()
+    endpoint: str,
+    folder: Path,
+    *arguments: str,
+    answers: bool = False,
+    stages: tuple[str, ...] = (),
+    environment: dict[str, str] | None = None,
 ) -> Iterator[tuple[Camera, Watcher]]:
     robot = f"r{len(list(folder.glob('*.log')))}-{folder.name}"[:60]
     with open_client(endpoint, shared_memory=False) as session:
         watcher = Watcher(session, robot, answers=answers, stages=stages)
-        camera = Camera(endpoint, robot, folder / f"{robot}.log", *arguments)
+        camera = Camera(endpoint, robot, folder / f"{robot}.log", *arguments, environment=environment or {})
         try:
             yield camera, watcher
         finally:
@@ -196,12 +209,43 @@ def test_lockstep_gives_equal_frames_in_two_runs_and_never_two_unanswered(endpoi
             assert watcher.most_unanswered == 1
             assert watcher.infos[-1].lockstep
             assert watcher.healths[-1].counters.get("lockstep_unanswered", 0) == 0
-    assert [seq for seq, _, _ in runs[0]] == list(range(70))
-    assert np.diff([stamp for _, stamp, _ in runs[0]]) == pytest.approx(40e6)
+    assert [(run, seq) for run, seq, _, _ in runs[0]] == [(0, index) for index in range(70)]
+    assert np.diff([stamp for _, _, stamp, _ in runs[0]]) == pytest.approx(40e6)
     assert runs[0] == runs[1]
     assert infos[0] == infos[1]
     assert [info.state for info in infos[0]] == ["streaming", "streaming", "ended"], "again after each 60 frames"
-    assert infos[0][-1].stamp_ns == runs[0][-1][1]
+    assert infos[0][-1].stamp_ns == runs[0][-1][2]
+
+
+def test_each_pass_of_a_loop_is_a_run_and_a_restart_begins_others(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=3)
+    arguments = ("--lockstep", "--set", f"source={film}", "--set", "loop=true")
+    named = []
+    for before in ("0", "2"):
+        environment = {STARTED_BEFORE: before}
+        with camera_and_watcher(
+            endpoint, tmp_path, *arguments, answers=True, stages=STAGES_BUT_CAMERA, environment=environment
+        ) as (_, watcher):
+            wait_for(lambda watcher=watcher: len(watcher.frames) >= 7, "three passes")
+            named.append(watcher.frame_ids()[:7])
+            stamps = [frame.stamp_ns for frame in watcher.frames]
+            assert np.diff(stamps) == pytest.approx(40e6), "time goes on"
+    passes = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0)]
+    assert named[0] == passes
+    assert named[1] == [((2 << 32) + run, seq) for run, seq in passes]
+
+
+def test_a_live_run_is_named_for_the_time_of_the_start(endpoint: str, tmp_path: Path) -> None:
+    film = write_film(tmp_path / "film.mp4", frames=3)
+    runs = []
+    for _ in range(2):
+        began_ms = time.time_ns() // 1_000_000
+        with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (_, watcher):
+            wait_for(watcher.at_end, "the end")
+            assert began_ms < watcher.frames[0].run < time.time_ns() // 1_000_000
+            assert {frame.run for frame in watcher.frames} == {watcher.frames[0].run}
+            runs.append(watcher.frames[0].run)
+    assert runs[0] < runs[1]
 
 
 def test_lockstep_goes_on_without_answers_and_counts_them(endpoint: str, tmp_path: Path) -> None:
@@ -278,14 +322,55 @@ def test_the_site_file_gives_calibration_and_mount(endpoint: str, tmp_path: Path
     )
     site = tmp_path / "site.yaml"
     site.write_text(
-        f"camera:\n  source: {film}\n  calibration: cam.yaml\n  mount: {{position_m: [0.1, 0, 1.4], pitch_up_deg: 5}}\n"
+        f"camera:\n  source: {film}\n  calibration: cam.yaml\n"
+        "  mount: {position_m: [0.1, 0, 1.4], pitch_up_deg: 5, roll_deg: 1}\n"
     )
     with camera_and_watcher(endpoint, tmp_path, "--site", str(site)) as (_, watcher):
         wait_for(watcher.at_end, "the end")
         info = watcher.infos[-1]
         assert info.camera_matrix == pytest.approx((150, 0, 79.5, 0, 150, 59.5, 0, 0, 1))
         assert (info.distortion_model, info.distortion) == ("plumb_bob", [0.1, 0, 0, 0, 0])
-        assert (info.mount.position_m, info.mount.pitch_up_deg) == ((0.1, 0.0, 1.4), 5.0)
+        assert (info.mount.position_m, info.mount.pitch_up_deg, info.mount.roll_deg) == ((0.1, 0.0, 1.4), 5.0, 1.0)
+
+
+def test_a_misspelt_field_of_the_mount_stops_the_stage_and_is_named(endpoint: str, tmp_path: Path) -> None:
+    with camera_and_watcher(endpoint, tmp_path, "--set", "mount.pitch_deg=5") as (camera, _):
+        assert camera.process.wait(PATIENCE_S) == 78
+        assert "settings of camera: mount.pitch_deg: " in camera.said
+
+
+@contextlib.contextmanager
+def web_server(folder: Path, port: int = 0) -> Iterator[int]:
+    """Files of a folder by HTTP on loopback; gives the port."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(folder))
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield int(server.server_address[1])
+        server.shutdown()
+
+
+def test_a_web_film_that_is_lost_and_comes_back_starts_at_0_in_a_new_run(endpoint: str, tmp_path: Path) -> None:
+    write_film(tmp_path / "film.mp4", frames=15)
+    with contextlib.ExitStack() as first_life:
+        port = first_life.enter_context(web_server(tmp_path))
+        arguments = ("--set", f"source=http://127.0.0.1:{port}/film.mp4", "--set", "loop=true", "--set", "retry_longest_s=0.5")
+        with camera_and_watcher(endpoint, tmp_path, *arguments) as (_, watcher):
+            wait_for(lambda: len(watcher.frames) > 2, "frames")
+            first_life.close()
+            wait_for(lambda: watcher.state() == "retrying", "the loss")
+            lost = watcher.infos[-1].run
+            with web_server(tmp_path, port):
+                wait_for(lambda: watcher.frames[-1].run > lost, "frames anew")
+            again = next(frame for frame in watcher.frames if frame.run > lost)
+            assert (again.run, again.seq) == (lost + 1, 0)
 
 
 @pytest.fixture
@@ -324,6 +409,9 @@ def test_a_stream_that_hangs_stops_neither_heartbeats_nor_shutdown_and_shows_no_
     arguments = ("--set", f"source={hanging_camera}", "--set", "read_timeout_s=30", "--set", "stalled_after_s=0.5")
     with camera_and_watcher(endpoint, tmp_path, *arguments) as (camera, watcher):
         wait_for(lambda: len(watcher.frames) > 5, "frames")
+        stamps = [frame.stamp_ns for frame in watcher.frames]
+        assert stamps == sorted(stamps)
+        assert 0 < time.time_ns() - stamps[-1] < 5e9, "stamps are Unix time"
         wait_for(lambda: watcher.state() == "retrying", "the stall")
         assert "is open but gives no new pictures" in watcher.infos[-1].reason
         beats = len(watcher.healths)

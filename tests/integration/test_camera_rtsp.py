@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from deixis_camera.config import CameraConfig
 from deixis_camera.sources import SourceLost
-from deixis_camera.streams import Stream
+from deixis_camera.videos import Stream
 
 FRAMES = 50
 RATE_HZ = 25.0
@@ -104,7 +104,7 @@ def server(film: bytes) -> Iterator[RtspServer]:
 
 
 def opened(url: str) -> Stream:
-    stream = Stream(url, CameraConfig(open_timeout_s=5, read_timeout_s=1), time.time_ns)
+    stream = Stream(url, CameraConfig(open_timeout_s=5, read_timeout_s=1))
     stream.open()
     return stream
 

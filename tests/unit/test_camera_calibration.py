@@ -85,6 +85,8 @@ def test_a_picture_of_another_aspect_ratio_is_refused_with_both_sizes(tmp_path: 
     [
         ("plumb_bob", array(0.1, 0, 0, 0, 0)),
         ("rational_polynomial", array(*[0.1] * 8)),
+        ("rational_polynomial", array(*[0.1] * 12)),
+        ("rational_polynomial", array(*[0.1] * 14)),
         ("equidistant", array(*[0.1] * 4)),
         ("", array()),
     ],

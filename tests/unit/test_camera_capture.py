@@ -13,10 +13,11 @@ from deixis_camera import capture as capture_module
 from deixis_camera.calibration import AssumedFieldOfView, Calibration, RosCalibration
 from deixis_camera.capture import BAD_PICTURES, Capture
 from deixis_camera.config import CameraConfig
-from deixis_camera.encode import Encoded
 from deixis_camera.handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
+from deixis_camera.pictures import Encoded
 from deixis_camera.sources import Picture, SourceLost
 
+FIRST_RUN = 7000
 GREY = np.full((90, 120, 3), 90, np.uint8)
 TINY = np.zeros((10, 10, 3), np.uint8)
 
@@ -64,8 +65,8 @@ def run(
         config,
         calibration or AssumedFieldOfView(60.0),
         handoff,
+        FIRST_RUN,
         lockstep=lockstep,
-        now_ns=lambda: 5,
         wake=lambda: None,
         log=logging.getLogger("test"),
     )
@@ -79,7 +80,7 @@ def run(
             time.sleep(0.001)
             continue
         found.append(item)
-        handoff.drop_first()
+        handoff.take(item)
         done = until(item)
     thread.stop(5.0)
     assert not thread.is_alive()
@@ -92,6 +93,10 @@ def finished(item: Item) -> bool:
 
 def seqs(items: list[Item]) -> list[int]:
     return [item.seq for item in items if isinstance(item, Ready)]
+
+
+def runs(items: list[Item]) -> list[int]:
+    return [item.run for item in items if isinstance(item, Ready)]
 
 
 def write_folder(folder: Path, pictures: list[np.ndarray]) -> str:
@@ -134,6 +139,7 @@ def test_loop_starts_again_at_0_while_time_goes_on(tmp_path: Path) -> None:
     assert seqs(items) == [0, 1, 2, 0, 1, 2, 0]
     times = [item.time_ns for item in items if isinstance(item, Ready)]
     assert times == [i * 200_000_000 for i in range(7)]
+    assert runs(items) == [FIRST_RUN + number for number in (0, 0, 0, 1, 1, 1, 2)], "each pass is a run of its own"
 
 
 def test_a_rate_limit_keeps_the_index_of_the_frames_it_lets_through(tmp_path: Path) -> None:
@@ -171,6 +177,28 @@ def test_a_lost_camera_is_tried_again_with_growing_pauses_and_its_count_goes_on(
     assert pauses[0] >= 0.05
     assert pauses[1:3].min() >= 0.1
     assert camera.closed >= 3, "a lost device is given back before the next try"
+    assert (runs(items), seqs(items)) == ([FIRST_RUN] * 2, [0, 1]), "it goes on in its run"
+
+
+class FakeWebFilm(FakeCamera):
+    """A film on a web server: each opening begins at its first picture."""
+
+    name = "fake film"
+    live = False
+
+    def open(self) -> None:
+        super().open()
+        self._seq = 0
+
+
+def test_a_film_that_is_lost_and_opened_again_starts_at_0_in_a_new_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    film = FakeWebFilm([GREY, GREY, "lost", "not there", GREY])
+    monkeypatch.setattr(capture_module, "source_for", lambda *_: film)
+    config = CameraConfig(retry_first_s=0.01, retry_longest_s=0.01)
+    items = run(config, until=lambda item: isinstance(item, Ready) and item.run > FIRST_RUN)
+    assert (runs(items), seqs(items)) == ([FIRST_RUN, FIRST_RUN, FIRST_RUN + 1], [0, 1, 0])
+    times = [item.time_ns for item in items if isinstance(item, Ready)]
+    assert times == sorted(set(times)), "time goes on"
 
 
 def test_a_live_camera_that_only_gives_useless_pictures_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,7 +227,7 @@ def test_a_fault_in_the_reader_is_said_and_not_swallowed(
 
 
 def ready(seq: int) -> Ready:
-    return Ready(seq, seq, Encoded(1, 1, "mono8", b"x"), AssumedFieldOfView(60).for_size(64, 64))
+    return Ready(FIRST_RUN, seq, seq, Encoded(1, 1, "mono8", b"x"), AssumedFieldOfView(60).for_size(64, 64))
 
 
 def test_of_live_pictures_the_newest_replaces_the_one_that_was_not_fetched_and_reports_stay() -> None:
@@ -211,7 +239,7 @@ def test_of_live_pictures_the_newest_replaces_the_one_that_was_not_fetched_and_r
     items = []
     while (item := handoff.first()) is not None:
         items.append(item)
-        handoff.drop_first()
+        handoff.take(item)
     assert [type(item) for item in items] == [Opened, Ready, Became]
     assert seqs(items) == [4]
     assert (handoff.take_overwritten(), handoff.take_overwritten()) == (4, 0)
@@ -227,7 +255,7 @@ def test_recorded_pictures_wait_for_room_and_none_is_lost() -> None:
         if isinstance(item, Ready):
             assert handoff.waiting_pictures() <= 2
             fetched.append(item.seq)
-            handoff.drop_first()
+            handoff.take(item)
     writer.join(5)
     assert fetched == list(range(20))
 
@@ -235,9 +263,22 @@ def test_recorded_pictures_wait_for_room_and_none_is_lost() -> None:
 def test_a_writer_that_waits_for_room_returns_when_the_reader_goes() -> None:
     handoff = Handoff(depth=1)
     handoff.put_recorded(ready(0))
-    answers = []
-    writer = threading.Thread(target=lambda: answers.append(handoff.put_recorded(ready(1))))
+    writer = threading.Thread(target=lambda: handoff.put_recorded(ready(1)))
     writer.start()
     handoff.close()
     writer.join(5)
-    assert answers == [False]
+    assert not writer.is_alive()
+    assert handoff.waiting_pictures() == 1
+
+
+def test_a_live_picture_that_comes_while_the_last_goes_out_is_not_lost() -> None:
+    handoff = Handoff()
+    first, second = ready(0), ready(1)
+    handoff.put_live(first)
+    assert handoff.first() is first
+    handoff.put_live(second)
+    assert not handoff.take(first), "it was replaced"
+    assert handoff.first() is second
+    assert handoff.take(second)
+    handoff.put_live(ready(2))
+    assert handoff.take_overwritten() == 1, "one that was taken is not counted as replaced"

@@ -5,8 +5,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from deixis_camera.files import VideoFile, video_format
+from deixis_camera.config import CameraConfig
+from deixis_camera.diagnosis import video_format
 from deixis_camera.sources import SourceBroken, SourceRefused
+from deixis_camera.videos import VideoFile
 
 
 def write_video(path: Path, frames: int = 12, size: tuple[int, int] = (160, 120), rate_hz: float = 30.0) -> Path:
@@ -18,6 +20,10 @@ def write_video(path: Path, frames: int = 12, size: tuple[int, int] = (160, 120)
         writer.write(np.full((size[1], size[0], 3), 10 + 10 * (index % 24), np.uint8))
     writer.release()
     return path
+
+
+def video_file(path: Path) -> VideoFile:
+    return VideoFile(path, CameraConfig())
 
 
 def read_all(file: VideoFile) -> tuple[list[tuple[int, int, float]], str]:
@@ -36,7 +42,7 @@ def read_all(file: VideoFile) -> tuple[list[tuple[int, int, float]], str]:
 
 @pytest.mark.parametrize("suffix", [".mp4", ".avi", ".mkv", ".mov"])
 def test_a_video_gives_every_frame_with_its_index_and_media_time(tmp_path: Path, suffix: str) -> None:
-    frames, said = read_all(VideoFile(write_video(tmp_path / f"film{suffix}")))
+    frames, said = read_all(video_file(write_video(tmp_path / f"film{suffix}")))
     assert [seq for seq, _, _ in frames] == list(range(12))
     assert [time_ns for _, time_ns, _ in frames] == pytest.approx([i * 1e9 / 30 for i in range(12)], abs=1e6)
     assert [level for _, _, level in frames] == pytest.approx([10 + 10 * i for i in range(12)], abs=4)
@@ -44,7 +50,7 @@ def test_a_video_gives_every_frame_with_its_index_and_media_time(tmp_path: Path,
 
 
 def test_a_file_opened_again_starts_at_its_first_frame(tmp_path: Path) -> None:
-    file = VideoFile(write_video(tmp_path / "film.mp4"))
+    file = video_file(write_video(tmp_path / "film.mp4"))
     assert read_all(file) == read_all(file)
 
 
@@ -54,7 +60,7 @@ def test_a_gif_keeps_the_pause_of_each_picture(tmp_path: Path) -> None:
     animation.durations = [100, 200, 50, 100, 100]
     path = tmp_path / "wave.gif"
     assert cv2.imwriteanimation(str(path), animation)
-    frames, said = read_all(VideoFile(path))
+    frames, said = read_all(video_file(path))
     assert [time_ns // 1_000_000 for _, time_ns, _ in frames] == [0, 100, 300, 350, 450]
     assert said == ""
 
@@ -76,23 +82,23 @@ def test_a_file_without_a_video_is_refused_with_its_name_and_the_cause(
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(SourceRefused) as refusal:
-        VideoFile(path).open()
+        video_file(path).open()
     assert str(path) in str(refusal.value)
     assert cause in str(refusal.value)
 
 
 def test_a_missing_file_is_told_from_a_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(SourceRefused, match=r"does not exist$"):
-        VideoFile(tmp_path / "film.mp4").open()
+        video_file(tmp_path / "film.mp4").open()
     with pytest.raises(SourceRefused, match="nor does its folder"):
-        VideoFile(tmp_path / "clips" / "film.mp4").open()
+        video_file(tmp_path / "clips" / "film.mp4").open()
 
 
 def test_a_film_cut_off_in_the_middle_plays_to_the_cut_and_says_so(tmp_path: Path) -> None:
     whole = write_video(tmp_path / "whole.avi", frames=30).read_bytes()
     cut = tmp_path / "cut.avi"
     cut.write_bytes(whole[: len(whole) * 6 // 10])
-    frames, said = read_all(VideoFile(cut))
+    frames, said = read_all(video_file(cut))
     assert 10 <= len(frames) < 25
     assert said == f"video file '{cut}' is cut off or damaged: {len(frames)} of about 30 frames could be read"
 
@@ -102,7 +108,7 @@ def test_an_mp4_without_its_index_is_said_to_be_cut_off(tmp_path: Path) -> None:
     cut = tmp_path / "cut.mp4"
     cut.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(SourceRefused, match=r"cut off \(its index, the 'moov' atom, is missing\)"):
-        VideoFile(cut).open()
+        video_file(cut).open()
 
 
 def test_the_format_is_told_by_the_first_bytes_and_not_by_the_name() -> None:

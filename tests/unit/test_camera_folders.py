@@ -1,14 +1,17 @@
 """Folders of pictures."""
 
+import re
+import struct
+import zlib
 from pathlib import Path
 from random import Random
 
 import cv2
 import numpy as np
 import pytest
+from deixis_camera.capture import source_for
 from deixis_camera.config import CameraConfig
-from deixis_camera.folders import Pictures, natural_order, picture_files
-from deixis_camera.kinds import source_for
+from deixis_camera.folders import Pictures, natural_order, picture_files, read_picture
 from deixis_camera.sources import Picture, PictureRefused, SourceRefused
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,6 +93,43 @@ def test_a_folder_without_pictures_is_refused_and_its_files_counted(tmp_path: Pa
 
 
 def test_a_single_picture_is_a_recording_of_one_frame(tmp_path: Path) -> None:
-    source = source_for(CameraConfig(source=str(write_picture(tmp_path / "one.jpg"))), lambda: 0)
+    source = source_for(CameraConfig(source=str(write_picture(tmp_path / "one.jpg"))))
     assert isinstance(source, Pictures)
     assert [picture.seq for picture in read_all(source) if isinstance(picture, Picture)] == [0]
+
+
+def claimed_size(data: bytes, width: int, height: int) -> bytes:
+    """A JPEG or PNG of 80 x 60 as it would be if its header claimed another size."""
+    if data.startswith(b"\xff\xd8"):
+        old, new = (struct.pack(">HH", *size) for size in ((60, 80), (height, width)))
+        return data.replace(old, new, 1)
+    old, new = (struct.pack(">II", *size) for size in ((80, 60), (width, height)))
+    head = data[:8] + data[8:33].replace(old, new, 1)
+    return head[:29] + struct.pack(">I", zlib.crc32(head[12:29])) + data[33:]
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+@pytest.mark.parametrize("size", [(8193, 60), (80, 8193), (30000, 30000), (65535, 100)])
+def test_a_picture_that_claims_to_be_huge_is_refused_before_it_is_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, size: tuple[int, int]
+) -> None:
+    path = write_picture(tmp_path / f"bomb{suffix}")
+    path.write_bytes(claimed_size(path.read_bytes(), *size))
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    said = f"picture 'bomb{suffix}' is too large: {size[0]} x {size[1]}, at most 8192 pixels a side are taken"
+    with pytest.raises(PictureRefused, match=f"^{re.escape(said)}$"):
+        read_picture(path)
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_a_picture_of_the_largest_size_is_decoded(tmp_path: Path, suffix: str) -> None:
+    assert read_picture(write_picture(tmp_path / f"wide{suffix}", size=(8192, 64))).shape == (64, 8192, 3)
+
+
+def test_the_size_of_a_jpeg_is_not_that_of_its_thumbnail(tmp_path: Path) -> None:
+    path = write_picture(tmp_path / "small.jpg")
+    thumbnail = claimed_size(path.read_bytes(), 30000, 30000)
+    data = write_picture(tmp_path / "photo.jpg").read_bytes()
+    segment = b"\xff\xe1" + struct.pack(">H", 2 + len(thumbnail)) + thumbnail
+    path.write_bytes(data[:2] + segment + b"\xff\xff" + data[2:])
+    assert read_picture(path).shape == (60, 80, 3), "also with fill bytes before a marker"

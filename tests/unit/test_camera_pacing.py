@@ -3,8 +3,9 @@
 from itertools import pairwise
 
 import pytest
-from deixis_camera.lockstep import ALL, NEEDED, REST_S, Lockstep, Readiness
-from deixis_camera.pacing import Backoff, OwnRate, RateLimit
+from deixis_camera.pacing import NEEDED_STAGES, OTHER_STAGES, REST_S, Backoff, Lockstep, OwnRate, RateLimit, Readiness
+from deixis_schemas import topics
+from deixis_schemas.messages import FrameId
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -78,37 +79,43 @@ def test_pauses_between_retries_double_up_to_the_longest_and_start_anew_after_a_
 def test_lockstep_feeds_the_next_frame_when_fusion_has_answered_the_last() -> None:
     lockstep = Lockstep(2.0)
     assert lockstep.may_feed(0.0)
-    lockstep.sent((7, 123), 0.0)
+    lockstep.sent(FrameId(123, 7), 0.0)
     assert not lockstep.may_feed(1.9)
-    lockstep.answered((7, 99))
-    assert not lockstep.may_feed(1.9), "an answer to another frame of that number is not the answer"
-    lockstep.answered((7, 123))
+    lockstep.answered(FrameId(99, 7))
+    assert not lockstep.may_feed(1.9), "the answer to the frame of that number of another run is not the answer"
+    lockstep.answered(FrameId(123, 7))
     assert lockstep.may_feed(1.9)
     assert lockstep.given_up() is None
 
 
 def test_lockstep_goes_on_when_no_answer_comes_and_names_the_frame_once() -> None:
     lockstep = Lockstep(2.0)
-    lockstep.sent((7, 123), 0.0)
+    lockstep.sent(FrameId(123, 7), 0.0)
     assert lockstep.may_feed(2.0)
     assert lockstep.given_up() == 7
     assert lockstep.given_up() is None
 
 
+def test_the_stages_to_wait_for_are_those_of_the_topic_table() -> None:
+    assert {"camera", *OTHER_STAGES} == set(topics.STAGES)
+    assert "camera" not in OTHER_STAGES
+    assert NEEDED_STAGES < OTHER_STAGES
+
+
 def test_the_first_frame_waits_for_all_stages_and_a_receiver() -> None:
     readiness = Readiness(0.0, 20.0)
-    assert not readiness.ready(set(ALL), False, 1.0)
+    assert not readiness.ready(set(OTHER_STAGES), False, 1.0)
     assert not readiness.ready({"tracker"}, True, 2.0)
-    assert readiness.ready({*ALL, "camera"}, True, 3.0)
+    assert readiness.ready({*OTHER_STAGES, "camera"}, True, 3.0)
 
 
 def test_the_first_frame_does_not_wait_for_stages_that_were_left_out() -> None:
     readiness = Readiness(0.0, 20.0)
-    assert not readiness.ready(set(NEEDED), True, 1.0)
+    assert not readiness.ready(set(NEEDED_STAGES), True, 1.0)
     assert not readiness.ready({"tracker"}, True, 2.0), "fusion went away: the rest starts anew"
-    assert not readiness.ready(set(NEEDED), True, 3.0)
-    assert not readiness.ready(set(NEEDED), True, 2.9 + REST_S)
-    assert readiness.ready(set(NEEDED), True, 3.0 + REST_S)
+    assert not readiness.ready(set(NEEDED_STAGES), True, 3.0)
+    assert not readiness.ready(set(NEEDED_STAGES), True, 2.9 + REST_S)
+    assert readiness.ready(set(NEEDED_STAGES), True, 3.0 + REST_S)
 
 
 def test_the_wait_for_the_first_frame_is_bounded() -> None:

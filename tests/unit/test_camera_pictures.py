@@ -3,8 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from deixis_camera.encode import encode
-from deixis_camera.pictures import Normaliser
+from deixis_camera.pictures import Normaliser, encode
 from deixis_camera.sources import PictureRefused
 from deixis_runtime.images import decode_image
 from deixis_schemas.messages import Frame
@@ -19,21 +18,18 @@ def gradient(width: int, height: int) -> np.ndarray:
 
 def test_a_colour_picture_of_good_size_passes_unchanged() -> None:
     picture = gradient(640, 480)
-    normal = Normaliser(1280).normalise(picture)
-    assert np.array_equal(normal.image, picture)
-    assert not normal.scaled
+    assert np.array_equal(Normaliser(1280).normalise(picture), picture)
 
 
 def test_a_picture_with_alpha_loses_only_its_alpha() -> None:
     picture = gradient(100, 80)
     alpha = np.dstack([picture, np.full((80, 100), 7, np.uint8)])
-    assert np.array_equal(Normaliser(1280).normalise(alpha).image, picture)
+    assert np.array_equal(Normaliser(1280).normalise(alpha), picture)
 
 
 @pytest.mark.parametrize("shape", [(80, 100), (80, 100, 1)])
 def test_a_grey_picture_stays_grey_and_travels_as_mono8(shape: tuple[int, ...]) -> None:
-    normal = Normaliser(1280).normalise(np.full(shape, 77, np.uint8))
-    encoded = encode(normal.image, "bgr8", 85)
+    encoded = encode(Normaliser(1280).normalise(np.full(shape, 77, np.uint8)), "bgr8", 85)
     assert (encoded.encoding, encoded.width, encoded.height, len(encoded.data)) == ("mono8", 100, 80, 8000)
 
 
@@ -41,7 +37,7 @@ def test_a_grey_picture_stays_grey_and_travels_as_mono8(shape: tuple[int, ...]) 
 def test_a_picture_smaller_than_64_pixels_a_side_is_refused(size: tuple[int, int], good: bool) -> None:
     normaliser = Normaliser(1280)
     if good:
-        assert normaliser.normalise(gradient(*size)).size_px == size
+        assert normaliser.normalise(gradient(*size)).shape == (size[1], size[0], 3)
         return
     with pytest.raises(PictureRefused, match=f"{size[0]} x {size[1]} is smaller than 64"):
         normaliser.normalise(gradient(*size))
@@ -51,10 +47,9 @@ def test_a_picture_smaller_than_64_pixels_a_side_is_refused(size: tuple[int, int
     ("size", "scaled"), [((7680, 4320), (1280, 720)), ((1080, 1920), (720, 1280)), ((8192, 8192), (1280, 1280))]
 )
 def test_a_large_picture_is_scaled_down_by_its_longer_side(size: tuple[int, int], scaled: tuple[int, int]) -> None:
-    normal = Normaliser(1280).normalise(np.full((size[1], size[0], 3), 50, np.uint8))
-    assert normal.size_px == scaled
-    assert normal.arrived_px == size
-    assert int(normal.image.min()) == int(normal.image.max()) == 50
+    pixels = Normaliser(1280).normalise(np.full((size[1], size[0], 3), 50, np.uint8))
+    assert pixels.shape == (scaled[1], scaled[0], 3)
+    assert int(pixels.min()) == int(pixels.max()) == 50
 
 
 def test_a_strip_that_would_be_too_narrow_when_scaled_down_is_refused() -> None:
@@ -64,15 +59,15 @@ def test_a_strip_that_would_be_too_narrow_when_scaled_down_is_refused() -> None:
 
 def test_16_bit_pictures_keep_their_brightness_at_full_scale() -> None:
     deep = gradient(100, 80).astype(np.uint16) << 8
-    assert np.array_equal(Normaliser(1280).normalise(deep).image, gradient(100, 80))
+    assert np.array_equal(Normaliser(1280).normalise(deep), gradient(100, 80))
 
 
 def test_12_bits_in_a_16_bit_picture_are_not_published_as_black() -> None:
     twelve = gradient(100, 80).astype(np.uint16) << 4
     normaliser = Normaliser(1280)
-    assert int(normaliser.normalise(twelve).image.max()) == 255
+    assert int(normaliser.normalise(twelve).max()) == 255
     assert normaliser.bits == 12
-    dark = normaliser.normalise(twelve // 8).image
+    dark = normaliser.normalise(twelve // 8)
     assert int(dark.max()) == 31, "a dark picture later on is dark, not brightened anew"
 
 

@@ -3,23 +3,22 @@
 from pathlib import Path
 
 import pytest
+from deixis_camera.capture import source_for
 from deixis_camera.config import CameraConfig
 from deixis_camera.devices import Device
-from deixis_camera.files import VideoFile
 from deixis_camera.folders import Pictures
-from deixis_camera.kinds import source_for
 from deixis_camera.sources import SourceRefused, without_credentials
-from deixis_camera.streams import Stream
+from deixis_camera.videos import Stream, VideoFile
 from pydantic import ValidationError
 
 
 def kind_of(source: object) -> type:
-    return type(source_for(CameraConfig.model_validate({"source": source}), lambda: 0))
+    return type(source_for(CameraConfig.model_validate({"source": source})))
 
 
 def test_a_number_is_a_device_also_when_yaml_makes_it_an_integer() -> None:
     assert kind_of(0) is kind_of("0") is kind_of("/dev/video2") is Device
-    assert source_for(CameraConfig(source="3"), lambda: 0).name == "/dev/video3"
+    assert source_for(CameraConfig(source="3")).name == "/dev/video3"
 
 
 @pytest.mark.parametrize("url", ["rtsp://cam/1", "RTSP://cam/1", "http://cam:8080/video", "https://cam/", "rtsps://cam/"])

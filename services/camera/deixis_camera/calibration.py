@@ -132,7 +132,7 @@ class _CameraInfoFile(BaseModel):
     image_width: int = Field(ge=1, le=65536)
     image_height: int = Field(ge=1, le=65536)
     camera_matrix: _Array
-    distortion_model: Literal["none", "plumb_bob", "rational_polynomial", "equidistant"] = "none"
+    distortion_model: DistortionModel = "none"
     distortion_coefficients: _Array | None = None
 
     @field_validator("distortion_model", mode="before")

@@ -6,7 +6,13 @@ from typing import Literal
 
 from deixis_runtime.settings import StageConfig
 from deixis_schemas.messages import CameraMount
-from pydantic import Field, field_validator
+from pydantic import ConfigDict, Field, field_validator
+
+
+class Mount(CameraMount):
+    """The mount as written by a person: a misspelt field is an error, not ignored as on the wire."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class CameraConfig(StageConfig):
@@ -47,7 +53,7 @@ class CameraConfig(StageConfig):
     horizontal_fov_deg: float = Field(
         default=60.0, ge=10, le=170, description="Horizontal field of view to assume where there is no calibration, degrees."
     )
-    mount: CameraMount = Field(default_factory=CameraMount, description="Pose of the optical centre in base_link.")
+    mount: Mount = Field(default_factory=Mount, description="Pose of the optical centre in base_link.")
     loop: bool = Field(default=False, description="Play a file or folder again and again.")
     open_timeout_s: float = Field(default=5.0, ge=0.5, le=60, description="Longest wait for a file or stream to open.")
     read_timeout_s: float = Field(

@@ -9,12 +9,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from deixis_schemas.messages import MAX_SIDE_PX
 
+from .diagnosis import head_of, video_format, why_not_decodable
 from .sources import Image, Picture, PictureRefused, SourceRefused
 
 SUFFIXES = frozenset(
     {".jpg", ".jpeg", ".jpe", ".png", ".bmp", ".dib", ".webp", ".tif", ".tiff", ".pgm", ".ppm", ".pbm", ".pnm", ".jp2"}
 )
+MJPEG_SUFFIXES = frozenset({".mjpg", ".mjpeg"})
 FOLDER_RATE_HZ = 5.0
 
 
@@ -63,6 +66,13 @@ def picture_files(folder: Path) -> list[Path]:
     return [folder / name for name in sorted(pictures, key=natural_order)]
 
 
+def is_picture(path: Path) -> bool:
+    """Whether a file is one picture: GIFs may be animated and MJPEG begins like a JPEG, so both are videos."""
+    if video_format(head_of(path)) == "gif" or path.suffix.lower() in MJPEG_SUFFIXES:
+        return False
+    return bool(cv2.haveImageReader(str(path)))
+
+
 def natural_order(name: str) -> tuple[list[tuple[int, int, str]], str]:
     """Sort key that compares digits as numbers and the rest without case; equal ones by the plain name."""
     parts = re.findall(r"\d+|\D+", name)
@@ -75,10 +85,9 @@ def read_picture(path: Path) -> Image:
         data = path.read_bytes()
     except OSError as error:
         raise PictureRefused(f"picture '{path.name}' cannot be read: {error.strerror or error}") from None
-    if not data:
-        raise PictureRefused(f"picture '{path.name}' is empty (0 bytes)")
-    if data.startswith(b"\xff\xd8") and not jpeg_is_whole(data):
-        raise PictureRefused(f"picture '{path.name}' is cut off")
+    cause = why_not_decodable(data, MAX_SIDE_PX)
+    if cause:
+        raise PictureRefused(f"picture '{path.name}' {cause}")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
     except cv2.error as error:
@@ -86,16 +95,3 @@ def read_picture(path: Path) -> Image:
     if image is None:
         raise PictureRefused(f"picture '{path.name}' cannot be decoded: not a picture, or damaged")
     return image
-
-
-def jpeg_is_whole(data: bytes) -> bool:
-    """Whether the end marker follows the start of scan (ITU-T T.81, B.1); OpenCV fills a cut-off picture up with grey.
-
-    Segments before the scan are skipped by their length: a thumbnail in one of them has an end marker of its own.
-    """
-    place = 2
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        if data[place + 1] == 0xDA:
-            return data.find(b"\xff\xd9", place) >= 0
-        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return False

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from deixis_schemas.messages import CameraState
 
 from .calibration import Intrinsics
-from .encode import Encoded
+from .pictures import Encoded
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A picture ready to publish; `passes` before this one were played, `seq` and `time_ns` as in sources.Picture."""
+    """A picture ready to publish. `run` and `seq` name it; `time_ns` as in sources.Picture, and over all passes."""
 
-    passes: int
+    run: int
     seq: int
     time_ns: int
     encoded: Encoded
@@ -68,21 +68,19 @@ class Handoff:
         self._closed = False
         self._overwritten = 0
 
-    def put_recorded(self, picture: Ready) -> bool:
-        """Wait for room and append; False when the reader has gone."""
+    def put_recorded(self, picture: Ready) -> None:
+        """Wait for room and append; returns at once when the reader has gone."""
         with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._pictures() < self._depth)
+            self._changed.wait_for(lambda: self._closed or self.waiting_pictures() < self._depth)
             if not self._closed:
                 self._items.append(picture)
-            return not self._closed
 
-    def put_live(self, picture: Ready) -> bool:
-        """Append, in place of a picture that was not fetched in time; False when the reader has gone."""
+    def put_live(self, picture: Ready) -> None:
+        """Append, in place of a picture that was not fetched in time."""
         with self._changed:
             kept = [item for item in self._items if not isinstance(item, Ready)]
             self._overwritten += len(self._items) - len(kept)
             self._items = deque([*kept, picture])
-            return not self._closed
 
     def report(self, item: Opened | Became | Refused | Noted) -> None:
         """Append what happened."""
@@ -94,16 +92,19 @@ class Handoff:
         with self._changed:
             return self._items[0] if self._items else None
 
-    def drop_first(self) -> None:
-        """Remove the oldest item, which `first` gave."""
+    def take(self, item: Item) -> bool:
+        """Remove `item`, which `first` gave; False where a newer live picture has come in its place meanwhile."""
         with self._changed:
-            self._items.popleft()
-            self._changed.notify_all()
+            there = bool(self._items) and self._items[0] is item
+            if there:
+                self._items.popleft()
+                self._changed.notify_all()
+            return there
 
     def waiting_pictures(self) -> int:
         """Pictures in the queue."""
         with self._changed:
-            return self._pictures()
+            return sum(isinstance(item, Ready) for item in self._items)
 
     def take_overwritten(self) -> int:
         """Live pictures replaced since the last call."""
@@ -116,6 +117,3 @@ class Handoff:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
-
-    def _pictures(self) -> int:
-        return sum(isinstance(item, Ready) for item in self._items)

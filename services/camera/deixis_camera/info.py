@@ -1,75 +1,63 @@
-"""What the stage says of its camera: the content of CameraInfo, and when it changes."""
+"""What the stage says of its camera: the content of CameraInfo, and whether it is news."""
 
 from __future__ import annotations
 
 from deixis_schemas.messages import CameraInfo, CameraMount, CameraState, Producer
 
 from .calibration import Intrinsics
+from .config import Mount
 
 
 class CameraStatus:
-    """State of the camera, kept by the loop thread."""
+    """State of the camera, kept by the loop thread. `changed`: there is news since it was last set to False."""
 
-    def __init__(self, source: str, mount: CameraMount, lockstep: bool) -> None:
-        self._source = source
-        self._mount = mount
-        self._lockstep = lockstep
-        self._size = (0, 0)
-        self._rate_hz = 0.0
+    def __init__(self, producer: Producer, source: str, mount: Mount, lockstep: bool) -> None:
+        self._info = CameraInfo(
+            stamp_ns=0,
+            stage=producer.stage,
+            instance=producer.instance,
+            state="starting",
+            source=source,
+            mount=CameraMount(**mount.model_dump()),
+            lockstep=lockstep,
+        )
         self._intrinsics: Intrinsics | None = None
-        self._run = 0
-        self._last_seq = -1
-        self._state: CameraState = "starting"
-        self._reason = ""
         self.changed = True
 
     @property
     def state(self) -> CameraState:
         """Whether it delivers."""
-        return self._state
+        return self._info.state
 
     def become(self, state: CameraState, reason: str = "") -> bool:
         """Enter a state; whether that is news."""
-        news = (state, reason) != (self._state, self._reason)
-        self._state, self._reason = state, reason
+        info, reason = self._info, reason[:2000]
+        news = (state, reason) != (info.state, info.reason)
+        info.state, info.reason = state, reason
         self.changed |= news
         return news
 
     def has_rate(self, rate_hz: float) -> None:
         """Frames per second that are published, by what the source says."""
-        self.changed |= rate_hz != self._rate_hz
-        self._rate_hz = rate_hz
+        self.changed |= rate_hz != self._info.rate_hz
+        self._info.rate_hz = rate_hz
 
     def projects(self, width: int, height: int, intrinsics: Intrinsics) -> bool:
         """Pictures of this size follow, with these intrinsics; whether that is news."""
-        news = (width, height) != self._size or intrinsics != self._intrinsics
-        self._size, self._intrinsics = (width, height), intrinsics
+        info = self._info
+        news = (width, height) != (info.width, info.height) or intrinsics != self._intrinsics
+        if news:
+            self._intrinsics = intrinsics
+            info.width, info.height, info.camera_matrix = width, height, intrinsics.camera_matrix
+            info.distortion_model, info.distortion = intrinsics.distortion_model, list(intrinsics.distortion)
+            info.intrinsics = intrinsics.source
         self.changed |= news
         return news
 
     def published(self, run: int, seq: int) -> None:
         """The frame went out; not news by itself."""
-        self._run, self._last_seq = run, seq
+        self._info.run, self._info.last_seq = run, seq
 
-    def info(self, producer: Producer, stamp_ns: int) -> CameraInfo:
-        """The message."""
-        intrinsics = self._intrinsics
-        return CameraInfo(
-            stamp_ns=stamp_ns,
-            stage=producer.stage,
-            instance=producer.instance,
-            state=self._state,
-            reason=self._reason[:2000],
-            source=self._source,
-            width=self._size[0],
-            height=self._size[1],
-            rate_hz=self._rate_hz,
-            camera_matrix=intrinsics.camera_matrix if intrinsics else None,
-            distortion_model=intrinsics.distortion_model if intrinsics else "none",
-            distortion=list(intrinsics.distortion) if intrinsics else [],
-            intrinsics=intrinsics.source if intrinsics else "",
-            mount=self._mount,
-            lockstep=self._lockstep,
-            run=self._run,
-            last_seq=self._last_seq,
-        )
+    def info(self, stamp_ns: int) -> CameraInfo:
+        """The message, speaking of `stamp_ns`."""
+        return self._info.model_copy(update={"stamp_ns": stamp_ns})

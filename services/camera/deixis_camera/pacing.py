@@ -1,9 +1,28 @@
-"""When a picture is published: a rate limit, a recording's own rate, and the pauses between retries."""
+"""When a picture is published: rate limit, a recording's own rate, lockstep; when a recording starts; pauses between retries.
+
+All times are of a monotonic clock, or of a recording's own: a wall clock that is set holds nothing up.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
+
+from deixis_schemas import topics
+from deixis_schemas.messages import FrameId
+
+LOCKSTEP_EPOCH_NS = 1_000_000_000_000_000_000
+"""Stamp of media time 0 in lockstep: 2001-09-09T01:46:40Z, a round number that nobody takes for today."""
+
+OTHER_STAGES = frozenset(topics.STAGES) - {topics.FRAME.stage}
+NEEDED_STAGES = frozenset({topics.TRACKS.stage, topics.BELIEF.stage})
+REST_S = 3.0
+USUAL_PERIOD_NS = 40_000_000
+
+
+def period_ns(rate_hz: float) -> int:
+    """Time from one picture of a recording to the next; that of 25 Hz where the rate is not known (0)."""
+    return round(1e9 / rate_hz) if rate_hz > 0 else USUAL_PERIOD_NS
 
 
 class RateLimit:
@@ -48,7 +67,7 @@ class OwnRate:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        self._period_ns = round(1e9 / rate_hz) if rate_hz > 0 else 40_000_000
+        self._period_ns = period_ns(rate_hz)
         self._start_ns: int | None = None
 
     def decide(self, media_ns: int, now_ns: int, newer_ready: bool) -> Decision:
@@ -64,6 +83,69 @@ class OwnRate:
             return Decision("drop", late_ns=late_ns)
         self._start_ns += late_ns
         return Decision("publish", fell_behind=True)
+
+
+class Lockstep:
+    """Whether the next frame may go out: when fusion has answered the last, so that two runs are equal."""
+
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._open: FrameId | None = None
+        self._sent_s = 0.0
+
+    def sent(self, frame_id: FrameId, now_s: float) -> None:
+        """The frame was published."""
+        self._open, self._sent_s = frame_id, now_s
+
+    def answered(self, frame_id: FrameId) -> None:
+        """fusion/belief of this frame came; one of another frame changes nothing."""
+        if frame_id == self._open:
+            self._open = None
+
+    def may_feed(self, now_s: float) -> bool:
+        """The last frame is answered, or its time is up."""
+        return self._open is None or now_s - self._sent_s >= self._timeout_s
+
+    def given_up(self) -> int | None:
+        """`seq` of a frame whose answer never came, once; call it when `may_feed` says yes."""
+        unanswered, self._open = self._open, None
+        return unanswered.seq if unanswered else None
+
+
+class Readiness:
+    """Whether the other stages are there, so that no first frame is lost.
+
+    Ready when all of them are alive and something receives frames; with tracker and fusion alone REST_S after those were seen
+    (the rest may be left out, or be slower to start); and after `longest_s` in any case.
+    """
+
+    def __init__(self, started_s: float, longest_s: float) -> None:
+        self._started_s = started_s
+        self._longest_s = longest_s
+        self._needed_since_s: float | None = None
+
+    def ready(self, alive: set[str] | None, matching: bool, now_s: float) -> bool:
+        """Whether to feed the first frame now; `alive` is None where any receiver will do (not in lockstep)."""
+        there = alive is None or self._there(alive, now_s)
+        return self.timed_out(now_s) or (matching and there)
+
+    def timed_out(self, now_s: float) -> bool:
+        """Waited `longest_s`."""
+        return now_s - self._started_s >= self._longest_s
+
+    def _there(self, alive: set[str], now_s: float) -> bool:
+        if not alive >= NEEDED_STAGES:
+            self._needed_since_s = None
+            return False
+        if self._needed_since_s is None:
+            self._needed_since_s = now_s
+        return alive >= OTHER_STAGES or now_s - self._needed_since_s >= REST_S
+
+
+def missing(alive: set[str] | None) -> str:
+    """What a timed-out Readiness waited for, to begin a message."""
+    absent = ", ".join(sorted(NEEDED_STAGES - alive)) if alive is not None else ""
+    return f"not alive: {absent}" if absent else "no stage has asked for frames"
 
 
 class Backoff:

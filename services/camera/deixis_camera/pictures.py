@@ -1,13 +1,18 @@
-"""From whatever arrives to what is published: 8 bits, grey or BGR, within bounds."""
+"""From whatever arrives to what is published: 8 bits, grey or BGR, within bounds, as bytes, with intrinsics for its size."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
+from deixis_schemas.messages import FrameEncoding
 from numpy.typing import NDArray
 
+from .calibration import Calibration, CalibrationError, Intrinsics
+from .config import CameraConfig
 from .sources import Image, PictureRefused
 
 SMALLEST_SIDE_PX = 64
@@ -17,49 +22,63 @@ Pixels = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Normal:
-    """A picture as it is published: (H, W) grey or (H, W, 3) BGR, uint8. `arrived_px`: its size before scaling."""
+class Encoded:
+    """Pixels as they travel."""
 
-    image: Pixels
-    arrived_px: tuple[int, int]
+    width: int
+    height: int
+    encoding: FrameEncoding
+    data: bytes
 
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """(width, height)."""
-        return self.image.shape[1], self.image.shape[0]
 
-    @property
-    def scaled(self) -> bool:
-        """Whether it was scaled down."""
-        return self.size_px != self.arrived_px
+class Preparation:
+    """Prepares the pictures of one source; `note` is told, under a key, what is done to them."""
+
+    def __init__(self, config: CameraConfig, calibration: Calibration, note: Callable[[str, str], None]) -> None:
+        self._config = config
+        self._calibration = calibration
+        self._note = note
+        self._normaliser = Normaliser(config.max_width)
+        self._notes: dict[str, str] = {}
+
+    def prepare(self, image: Image) -> tuple[Encoded, Intrinsics]:
+        """The picture as it is published, and how it projects. Raises PictureRefused."""
+        pixels = self._normaliser.normalise(image)
+        try:
+            intrinsics = self._calibration.for_size(pixels.shape[1], pixels.shape[0])
+        except CalibrationError as error:
+            raise PictureRefused(str(error)) from None
+        if pixels.shape[:2] != image.shape[:2]:
+            self._note_change("scaled", f"pictures of {_size(image)} are scaled down to {_size(pixels)}")
+        if self._normaliser.deep:
+            self._note_change("depth", f"16-bit pictures are taken as {self._normaliser.bits}-bit and published as 8-bit")
+        return encode(pixels, self._config.encoding, self._config.quality), intrinsics
+
+    def _note_change(self, key: str, text: str) -> None:
+        if self._notes.get(key) != text:
+            self._notes[key] = text
+            self._note(key, text)
 
 
 class Normaliser:
     """Brings pictures of one source to 8-bit grey or BGR of at most `longest_px` a side.
 
-    Remembers one thing: the bit depth that 16-bit pictures have used so far. Many cameras put 10 or 12 bits into 16; taken at
-    their word such pictures are black.
+    Remembers one thing: the bit depth that 16-bit pictures have used so far (`bits`; `deep` where there were any). Many cameras
+    put 10 or 12 bits into 16; taken at their word such pictures are black.
     """
 
     def __init__(self, longest_px: int) -> None:
         self._longest_px = longest_px
-        self._bits = 8
+        self.bits = 8
         self.deep = False
 
-    @property
-    def bits(self) -> int:
-        """Bits that 16-bit pictures were seen to use."""
-        return self._bits
-
-    def normalise(self, image: Image) -> Normal:
-        """The picture to publish. Raises PictureRefused for a size, depth or number of channels that has no use."""
+    def normalise(self, image: Image) -> Pixels:
+        """(H, W) grey or (H, W, 3) BGR. Raises PictureRefused for a size, depth or number of channels that has no use."""
         if image.ndim not in (2, 3):
             raise PictureRefused(f"picture has {image.ndim} dimensions instead of 2 or 3")
-        height, width = image.shape[:2]
-        if min(width, height) < SMALLEST_SIDE_PX:
-            raise PictureRefused(f"picture of {width} x {height} is smaller than {SMALLEST_SIDE_PX} pixels a side")
-        small = self._shrink(_without_alpha(image))
-        return Normal(np.ascontiguousarray(self._to_8_bits(small)), (width, height))
+        if min(image.shape[:2]) < SMALLEST_SIDE_PX:
+            raise PictureRefused(f"picture of {_size(image)} is smaller than {SMALLEST_SIDE_PX} pixels a side")
+        return np.ascontiguousarray(self._to_8_bits(self._shrink(_without_alpha(image))))
 
     def _shrink(self, image: Image) -> Image:
         height, width = image.shape[:2]
@@ -78,8 +97,22 @@ class Normaliser:
             raise PictureRefused(f"picture has {image.dtype} values instead of 8 or 16 bit")
         self.deep = True
         peak = int(image.max())
-        self._bits = max(self._bits, next(bits for bits in BIT_DEPTHS if peak < 1 << bits))
-        return np.right_shift(image, self._bits - 8, dtype=np.uint16).astype(np.uint8)
+        self.bits = max(self.bits, next(bits for bits in BIT_DEPTHS if peak < 1 << bits))
+        return np.right_shift(image, self.bits - 8, dtype=np.uint16).astype(np.uint8)
+
+
+def encode(pixels: Pixels, encoding: Literal["bgr8", "jpeg"], quality: int) -> Encoded:
+    """The bytes of a (H, W) or (H, W, 3) picture: raw (`mono8` where it is grey) or a JPEG of `quality` 1 to 100.
+
+    Raises PictureRefused where the JPEG coder fails.
+    """
+    height, width = pixels.shape[:2]
+    if encoding == "bgr8":
+        return Encoded(width, height, "mono8" if pixels.ndim == 2 else "bgr8", pixels.tobytes())
+    good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not good:
+        raise PictureRefused(f"picture of {width} x {height} cannot be made a JPEG")
+    return Encoded(width, height, "jpeg", data.tobytes())
 
 
 def _without_alpha(image: Image) -> Image:
@@ -91,3 +124,7 @@ def _without_alpha(image: Image) -> Image:
     if channels == 4:
         return np.ascontiguousarray(image[:, :, :3])
     raise PictureRefused(f"picture has {channels} channels instead of 1 (grey), 3 (BGR) or 4 (BGR and alpha)")
+
+
+def _size(image: Image) -> str:
+    return f"{image.shape[1]} x {image.shape[0]}"

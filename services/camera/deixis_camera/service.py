@@ -15,8 +15,7 @@ from .capture import Capture
 from .config import CameraConfig
 from .handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
 from .info import CameraStatus
-from .lockstep import EPOCH_NS, Lockstep, Readiness, missing
-from .pacing import OwnRate
+from .pacing import LOCKSTEP_EPOCH_NS, Lockstep, OwnRate, Readiness, missing
 from .sources import without_credentials
 
 INFO_PERIOD_S = 2.0
@@ -26,7 +25,7 @@ HEALTH: dict[str, HealthState] = {"retrying": "degraded", "failed": "failed"}
 
 
 class CameraStage:
-    """The loop thread's side of the camera. Everything that touches the node happens here."""
+    """The loop thread's side of the camera. Everything that touches the node happens here; `handoff` brings what to publish."""
 
     def __init__(self, node: Node, config: CameraConfig) -> None:
         self._node = node
@@ -34,8 +33,8 @@ class CameraStage:
         self._frames = node.publish(topics.FRAME)
         self._infos = node.publish(topics.CAMERA_INFO)
         self._beliefs = node.subscribe(topics.BELIEF, depth=8) if node.lockstep else None
-        self._status = CameraStatus(without_credentials(config.source), config.mount, node.lockstep)
-        self._handoff = Handoff()
+        self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, node.lockstep)
+        self.handoff = Handoff()
         self._lockstep = Lockstep(config.lockstep_timeout_s)
         self._live = False
         self._started = False
@@ -44,9 +43,7 @@ class CameraStage:
         self._hold_s = 0.0
         self._info_due_s = 0.0
         self._frames_since_info = 0
-        self._stamp_ns = EPOCH_NS
-        # Live, the time of the start tells one start from another; in lockstep two runs are to be equal.
-        self._first_run = node.started_before << 32 if node.lockstep else node.now_ns() // 1_000_000
+        self._stamp_ns = LOCKSTEP_EPOCH_NS
         self._picture_s = 0.0
         node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
 
@@ -55,7 +52,7 @@ class CameraStage:
         capture = self._start_capture()
         try:
             while self._node.wait(timeout_s=self._next_s()):
-                self._step()
+                self.step()
         finally:
             if capture is not None:
                 capture.stop(STOP_WAIT_S)
@@ -71,7 +68,7 @@ class CameraStage:
             return None
         node = self._node
         capture = Capture(
-            self._config, calibration, self._handoff, lockstep=node.lockstep, now_ns=node.now_ns, wake=node.wake, log=node.log
+            self._config, calibration, self.handoff, first_run(node), lockstep=node.lockstep, wake=node.wake, log=node.log
         )
         capture.start()
         return capture
@@ -79,26 +76,24 @@ class CameraStage:
     def _calibration(self) -> Calibration:
         if self._config.calibration is None:
             return AssumedFieldOfView(self._config.horizontal_fov_deg)
-        return load_calibration(self._beside_site(self._config.calibration))
-
-    def _beside_site(self, name: str) -> Path:
-        folder = self._node.site.path.parent if self._node.site is not None else Path()
-        return folder / name
+        beside = self._node.site.path.parent if self._node.site is not None else Path()
+        return load_calibration(beside / self._config.calibration)
 
     # --- each turn of the loop ----------------------------------------------------------------------------------------
 
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One turn of the loop: apply what the capture thread reported, and publish what is due."""
         self._take_answers()
         self._hold_s = INFO_PERIOD_S
-        item = self._handoff.first()
+        item = self.handoff.first()
         while item is not None and not isinstance(item, Ready):
+            self.handoff.take(item)
             self._apply(item)
-            self._handoff.drop_first()
-            item = self._handoff.first()
+            item = self.handoff.first()
         if isinstance(item, Ready):
             self._handle(item)
         self._watch_for_stall()
-        overwritten = self._handoff.take_overwritten()
+        overwritten = self.handoff.take_overwritten()
         if overwritten:
             self._node.count("pictures_overwritten", overwritten)
         self._publish_info()
@@ -114,8 +109,7 @@ class CameraStage:
     def _handle(self, picture: Ready) -> None:
         """Publish or drop the picture, or leave it for later and say for how long in `_hold_s`."""
         if self._live:
-            self._publish(picture, picture.time_ns)
-            self._handoff.drop_first()
+            self._publish(picture, self._ago_ns(self._monotonic_ns() - picture.time_ns))
         elif not self._others_ready():
             self._hold_s = 0.1
         elif self._node.lockstep:
@@ -124,19 +118,17 @@ class CameraStage:
             self._play(picture)
 
     def _play(self, picture: Ready) -> None:
-        now_ns = round(self._node.monotonic_s() * 1e9)
-        decision = self._own_rate.decide(picture.time_ns, now_ns, self._handoff.waiting_pictures() > 1)
+        decision = self._own_rate.decide(picture.time_ns, self._monotonic_ns(), self.handoff.waiting_pictures() > 1)
         if decision.act == "wait":
             self._hold_s = decision.wait_s
         elif decision.act == "drop":
             self._node.count("pictures_skipped")
-            self._handoff.drop_first()
+            self.handoff.take(picture)
             self._hold_s = 0.0
         else:
             if decision.fell_behind:
                 self._node.count("playback_fell_behind")
-            self._publish(picture, self._node.now_ns() - decision.late_ns)
-            self._handoff.drop_first()
+            self._publish(picture, self._ago_ns(decision.late_ns))
 
     def _feed(self, picture: Ready) -> None:
         now_s = self._node.monotonic_s()
@@ -147,17 +139,21 @@ class CameraStage:
         if unanswered is not None:
             self._node.count("lockstep_unanswered")
             limit = self._config.lockstep_timeout_s
-            self._node.warn("lockstep", f"fusion did not answer frame {unanswered} within {limit:g} s; the next is fed")
-        stamp_ns = EPOCH_NS + picture.time_ns
-        self._publish(picture, stamp_ns)
-        self._lockstep.sent(FrameId(self._first_run + picture.passes, picture.seq), now_s)
-        self._handoff.drop_first()
+            self._node.warn(
+                "lockstep", f"{topics.BELIEF.stage} did not answer frame {unanswered} within {limit:g} s; the next is fed"
+            )
+        self._publish(picture, LOCKSTEP_EPOCH_NS + picture.time_ns)
+        self._lockstep.sent(FrameId(picture.run, picture.seq), now_s)
 
     def _publish(self, picture: Ready, stamp_ns: int) -> None:
-        encoded, producer, run = picture.encoded, self._node.producer, self._first_run + picture.passes
+        """Publish the picture, unless a newer live one has come in its place meanwhile."""
+        self._hold_s = 0.0
+        if not self.handoff.take(picture):
+            return
+        encoded, producer = picture.encoded, self._node.producer
         with self._node.step():
             frame = Frame(
-                run=run,
+                run=picture.run,
                 seq=picture.seq,
                 stamp_ns=stamp_ns,
                 stage=producer.stage,
@@ -174,9 +170,15 @@ class CameraStage:
             self._frames_since_info += 1
             self._publish_info()  # before the frame where it is news: who reads the frame needs its intrinsics
             self._frames.put(frame)
-        self._status.published(run, picture.seq)
+        self._status.published(picture.run, picture.seq)
         self._picture_s = self._node.monotonic_s()
-        self._hold_s = 0.0
+
+    def _monotonic_ns(self) -> int:
+        return round(self._node.monotonic_s() * 1e9)
+
+    def _ago_ns(self, age_ns: int) -> int:
+        """Unix time of what was `age_ns` ago. Ages are measured on the monotonic clock: the wall clock may be set meanwhile."""
+        return self._node.now_ns() - age_ns
 
     def _others_ready(self) -> bool:
         """Whether a recording may start: a clip's first frames are not to be lost."""
@@ -212,7 +214,7 @@ class CameraStage:
         rate_hz = min(limit, opened.rate_hz) if limit and opened.rate_hz else limit or opened.rate_hz
         self._status.has_rate(rate_hz)
         self._picture_s = self._node.monotonic_s()
-        if not self._started:
+        if self._status.state != "streaming":  # not between two passes: the next one follows without a gap
             self._own_rate = OwnRate(rate_hz)
 
     def _become(self, became: Became) -> None:
@@ -251,10 +253,15 @@ class CameraStage:
         return self._status.changed or now_s >= self._info_due_s
 
     def _info(self) -> CameraInfo:
-        return self._status.info(self._node.producer, self._stamp_ns if self._node.lockstep else self._node.now_ns())
+        return self._status.info(self._stamp_ns if self._node.lockstep else self._node.now_ns())
 
     def _answer(self, _query: Query) -> list[tuple[str, Message]]:
         return [(topics.CAMERA_INFO.key(self._node.robot), self._info())]
+
+
+def first_run(node: Node) -> int:
+    """Number of the first run. Live, the time tells this start from others; in lockstep two runs are to be equal."""
+    return node.started_before << 32 if node.lockstep else node.now_ns() // 1_000_000
 
 
 def serve(node: Node, config: CameraConfig) -> None:
@@ -265,4 +272,4 @@ def serve(node: Node, config: CameraConfig) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Console script `deixis-camera`."""
-    return run_stage("camera", CameraConfig, serve, argv)
+    return run_stage("camera", CameraConfig, serve, argv, "Devices, files and streams to frames.")

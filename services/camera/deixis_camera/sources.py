@@ -1,4 +1,4 @@
-"""What every kind of source has in common, and which kind a source string names."""
+"""What every kind of source has in common, and what a source string names."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Picture:
     """A picture as it comes from a source.
 
     seq: of a recording the picture's index from 0, of a live source the count of pictures read.
-    time_ns: of a recording media time from its start; of a live source the Unix time at which it was there.
+    time_ns: of a recording media time from its start; of a live source the time of its capture on the monotonic clock.
     image: (H, W) or (H, W, channels), any integer depth.
     """
 
