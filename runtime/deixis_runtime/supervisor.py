@@ -20,6 +20,7 @@ RESTART_WINDOW_S = 60.0
 BACKOFF_S = 0.5
 BACKOFF_MAX_S = 8.0
 STOP_TIMEOUT_S = 4.0
+KILL_TIMEOUT_S = 1.0
 
 
 @dataclass
@@ -92,14 +93,24 @@ class Supervisor:
         except subprocess.TimeoutExpired:
             log.warning("%s does not stop; killing it", process.name)
             process.popen.kill()
-            process.popen.wait()
+            self._await_killed(process.popen, process.name)
+
+    def _await_killed(self, popen: subprocess.Popen[bytes], name: str) -> None:
+        try:
+            popen.wait(KILL_TIMEOUT_S)
+        except subprocess.TimeoutExpired:  # within a system call that does not return, as of a broken device
+            log.error("%s (process %d) cannot be killed; it is left behind", name, popen.pid)
 
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
         process.spawned_s = time.monotonic()
         environment = {**os.environ, STARTED_BEFORE: str(process.started)}
         process.started += 1
-        process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+        try:
+            process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+        except OSError as error:
+            process.given_up = f"it cannot be started: {error.strerror}"
+            log.error("%s is given up: %s", process.name, process.given_up)
 
     def _plan_restart(self, process: Process) -> None:
         assert process.popen is not None

@@ -48,7 +48,7 @@ class CameraStage:
         # Live, the time of the start tells one start from another; in lockstep two runs are to be equal.
         self._first_run = node.started_before << 32 if node.lockstep else node.now_ns() // 1_000_000
         self._picture_s = 0.0
-        node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
+        node.serve_get(topics.CAMERA_INFO, self._answer)
 
     def run(self) -> None:
         """Until shutdown."""
