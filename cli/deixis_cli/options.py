@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 
 from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
@@ -10,6 +11,8 @@ from deixis_runtime.session import DEFAULT_ENDPOINT
 from deixis_runtime.settings import checked_name
 from deixis_runtime.site import Site, SiteError, load_site
 from deixis_schemas import topics
+
+log = logging.getLogger("deixis")
 
 DEMO_ROBOT = "demo"
 
@@ -64,6 +67,9 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
     Raises CommandError or HostFailed.
     """
     stages = chosen_stages(_names(given.only), _names(given.without))
+    absent = set(topics.STAGES) - {*stages, *_names(given.without)}
+    if absent and not given.only:
+        log.warning("not installed here and so not started: %s", ", ".join(sorted(absent)))
     sets = stage_settings(given.sets)
     # Ahead of --set, which so may override them.
     ours = [f"{name}={value}" for name, value in (source or {}).items()]

@@ -16,7 +16,6 @@ from deixis_schemas.topics import Topic
 from .outputs import oversize
 
 MAX_WAITING = 64
-MAX_PAYLOAD_BYTES = 1 << 20
 # Edits are small and each counts: a registry put POI by POI comes in one burst. Only a flood gets here.
 MAX_EDITS = 10_000
 MAX_EDIT_BYTES = 32 << 20
@@ -97,8 +96,8 @@ class QueryQueue:
         if wanted not in ("msgpack", "json"):
             raise Refused(f"format: '{wanted[:40]}' is neither 'msgpack' nor 'json'")
         payload = query.payload.to_bytes() if query.payload is not None else None
-        if payload is not None and len(payload) > MAX_PAYLOAD_BYTES:
-            raise Refused(f"payload: {len(payload)} bytes, more than {MAX_PAYLOAD_BYTES}")
+        if payload is not None and len(payload) > self._topic.max_bytes:
+            raise Refused(f"payload: {oversize(len(payload), self._topic)}")
         encoding = str(query.encoding) if query.encoding is not None else ""
         for key, message in self._answer(Query(str(query.key_expr), parameters, payload, encoding)):
             content = codec.encode_json(message) if wanted == "json" else codec.encode(message)

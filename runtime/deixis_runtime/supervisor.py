@@ -21,6 +21,7 @@ BACKOFF_S = 0.5
 BACKOFF_MAX_S = 8.0
 STOP_TIMEOUT_S = 4.0
 KILL_TIMEOUT_S = 1.0
+SIGNALS = {number.value: number.name for number in signal.Signals}
 
 
 @dataclass
@@ -131,7 +132,7 @@ class Supervisor:
 def say_status(status: int) -> str:
     """An exit status in words."""
     if status < 0:
-        return f"killed by {signal.Signals(-status).name}"
+        return f"killed by {SIGNALS.get(-status, f'signal {-status}')}"
     if status == EXIT_UNREACHABLE:
         return "no router, or its endpoint is taken"
     return f"status {status}"

@@ -89,9 +89,10 @@ def test_a_stage_that_is_installed_is_started_and_may_have_settings_with_no_list
     assert read_site(site).settings == {"gaze": {"x": 1}}
 
 
-def test_what_is_not_installed_is_not_started_and_said_where_it_is_asked_for(tmp_path, monkeypatch):
+def test_what_is_not_installed_is_not_started_and_said(tmp_path, monkeypatch, caplog):
     installed(monkeypatch, "camera")
     assert options().stages == ("camera",)
+    assert "not installed here and so not started: fusion, gesture, headpose, tracker" in caplog.text
     assert options("--except", "fusion").stages == ("camera",)
     with pytest.raises(HostFailed, match="'fusion' is not installed here"):
         options("--only", "fusion")
