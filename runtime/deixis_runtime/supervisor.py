@@ -32,7 +32,6 @@ class Process:
     argv: list[str]
     popen: subprocess.Popen[bytes] | None = None
     restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
-    spawned_s: float = 0.0
     started: int = 0
     start_again_s: float | None = None
     given_up: str = ""
@@ -104,7 +103,6 @@ class Supervisor:
 
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
-        process.spawned_s = time.monotonic()
         environment = {**os.environ, STARTED_BEFORE: str(process.started)}
         process.started += 1
         try:
