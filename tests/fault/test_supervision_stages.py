@@ -200,6 +200,7 @@ def test_a_source_that_is_no_video_ends_the_run_with_its_cause(tmp_path, robot, 
     assert "notes.mp4" in ended.stderr
 
 
+@pytest.mark.slow
 def test_a_stage_that_is_given_up_degrades_the_system_and_the_run_says_so_at_its_end(tmp_path, robot, endpoint, pictures):
     log = tmp_path / "log"
     argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", "camera,fusion,gesture")
@@ -222,6 +223,7 @@ def test_a_stage_that_is_given_up_degrades_the_system_and_the_run_says_so_at_its
     assert log.read_text().count("gesture is given up") == 2, "logged once, and told at the end"
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_given_up_ends_the_run_for_nothing_comes_any_more(tmp_path, robot, endpoint, pictures):
     log = tmp_path / "log"
     argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", "camera,gesture", "--loop")
@@ -232,6 +234,7 @@ def test_a_camera_that_is_given_up_ends_the_run_for_nothing_comes_any_more(tmp_p
     assert "deixis run: camera is given up: it ended" in log.read_text()
 
 
+@pytest.mark.slow
 def test_up_goes_on_without_a_stage_that_is_given_up_and_ends_when_none_is_left(up):
     give_up(up.child.pid, "fusion", up.log)
     before = up.frames()

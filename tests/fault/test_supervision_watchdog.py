@@ -49,6 +49,7 @@ def processes(supervisor):
     return {name: child_called(supervisor.pid, word) for name, word in words.items()}
 
 
+@pytest.mark.slow
 def test_neither_a_crash_of_the_router_nor_a_standstill_kills_a_healthy_stage_and_a_hung_one_is_still_found(supervised):
     child, log = supervised
     before = processes(child)
