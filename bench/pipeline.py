@@ -28,7 +28,7 @@ import cv2
 import numpy as np
 import zenoh
 from deixis_evaluation.machine import describe_machine, say_machine
-from deixis_runtime.host import Host, HostFailed, HostOptions
+from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.session import Unreachable
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Belief
@@ -76,7 +76,7 @@ class Beliefs:
 def measure(source: Path, site: Path, seconds: float) -> dict[str, float]:
     """Run the pipeline and give the figures. Raises HostFailed or Unreachable."""
     length = clip_length(source)
-    sets: dict[str, tuple[str, ...]] = {"camera": (f"source={json.dumps(str(source))}", "loop=true", "encoding=bgr8")}
+    sets: dict[str, tuple[str, ...]] = {SOURCE: (f"source={json.dumps(str(source))}", "loop=true", "encoding=bgr8")}
     beliefs = Beliefs()
     with Host(HostOptions(robot=ROBOT, stages=topics.STAGES, site=site, listen=(), sets=sets)) as host:
         began_s = time.monotonic()
@@ -116,6 +116,8 @@ def watch(host: Host, seconds: float) -> None:
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         host.poll()
+        if host.given_up:
+            raise HostFailed(f"given up while measured: {', '.join(host.given_up)}")
         time.sleep(TURN_S)
 
 

@@ -106,6 +106,20 @@ def system(folder: Path, robot: str, *arguments: object) -> Iterator[System]:
             yield System(robot, endpoint, session, child, log)
 
 
+def children(pid: int) -> list[int]:
+    """Process numbers of the children of a process."""
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def child_called(pid: int, word: str) -> int | None:
+    """The child that has the word in its command line, e.g. `deixis-camera` or `deixis_runtime.router`; None without one."""
+    for child in children(pid):
+        with suppress(FileNotFoundError):  # it has just ended
+            if word.encode() in Path(f"/proc/{child}/cmdline").read_bytes():
+                return child
+    return None
+
+
 def answers(endpoint: str) -> bool:
     """Whether a router answers at the endpoint."""
     with suppress(Unreachable), open_client(endpoint, shared_memory=False):

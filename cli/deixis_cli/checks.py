@@ -99,7 +99,7 @@ def silenced(system: System, listening: Listening) -> Iterator[Finding]:
             f"{', '.join(unheard)}: health is answered to a get but not heard by listening",
             "access control on the way denies subscriptions, or the stage's own publications",
         )
-    if "fusion" in answering and system.state is None:
+    if topics.STATE.stage in answering and system.state is None:
         yield Finding("wrong", "fusion/state: a get is not answered", "access control on the way denies it")
     if listening.edits_reach_fusion is False:
         yield Finding("wrong", "fusion/poi: an edit by get does not reach fusion", "access control on the way denies it")
@@ -133,7 +133,7 @@ def rates(system: System) -> Iterator[Finding]:
     for topic in topics.TOPICS:
         if topic.by is not By.FRAME or topic.rate_hz is None:
             continue
-        for health in _settled(system, topic.path.split("/")[0]):
+        for health in _settled(system, topic.stage):
             # The table names the rate of an ordinary camera; this one may be slower or faster.
             expected_hz = min([camera.rate_hz or topic.rate_hz, *_given_hz(health)])
             rate_hz = next((item.rate_hz for item in health.outputs if item.key.endswith("/" + topic.path)), 0.0)
@@ -157,7 +157,7 @@ def inputs(system: System) -> Iterator[Finding]:
         for item in process.health.inputs if process.health else []:
             path = "/".join(item.key.split("/")[2:])
             if item.rejected:
-                advice = "somebody publishes what breaks the contract: deixis check-stage"
+                advice = "its producer breaks the contract of schemas/contract/topics.md: mend that, or stop it"
                 yield Finding("wrong", f"{process.stage} refused {item.rejected} of {path}: {item.last_error}", advice)
             young = process.health is None or process.health.uptime_s < SETTLED_S
             if streaming and path in per_frame and not young and (item.age_s is None or item.age_s > STALE_S):
@@ -183,10 +183,10 @@ def registry(state: State | None) -> Iterator[Finding]:
     """Points of interest, and the edits that were refused."""
     if state is None:
         return
-    if not state.pois:
+    if not state.pois_total:
         yield Finding("wrong", "there are no points of interest", "give a --site with pois, or: deixis poi add ID X Y Z")
     else:
-        yield Finding("ok", f"{len(state.pois)} points of interest in {state.registry_path}")
+        yield Finding("ok", f"{state.pois_total} points of interest in {state.registry_path}")
     for edit in state.rejected_edits[-3:]:
         yield Finding("note", f"an edit of {edit.key} was refused: {edit.reason}")
 

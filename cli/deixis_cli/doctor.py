@@ -62,7 +62,7 @@ def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
     if not system.processes:
         advice = "is the robot's name right? Does access control deny liveliness and gets to us?"
         return [Finding("wrong", f"no stage of robot '{robot}' is alive or answers", advice)]
-    fusion = any(process.stage == "fusion" and process.health is not None for process in system.processes)
+    fusion = any(process.stage == topics.POI.stage and process.health is not None for process in system.processes)
     reach = edits_reach_fusion(session, robot) if fusion else None
     time.sleep(max(0.0, LISTEN_S - (time.monotonic() - began_s)))
     subscriber.undeclare()  # type: ignore[no-untyped-call]

@@ -8,7 +8,7 @@ from typing import TypeVar
 import zenoh
 from deixis_runtime.delivery import GET_PRIORITY
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import Health, Message, State
+from deixis_schemas.messages import Health, Message, Poi, State
 
 T = TypeVar("T", bound=Message)
 
@@ -54,7 +54,7 @@ def get_all(
             continue
         key = str(reply.ok.key_expr)
         try:
-            good.append((key, codec.decode(type_, reply.ok.payload.to_bytes(), str(reply.ok.encoding))))
+            good.append((key, _read(type_, key, reply.ok)))
         except codec.CodecError as error:
             bad.append(Refusal(key, str(error)))
     return good, bad
@@ -66,7 +66,30 @@ def get_state(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) 
     return states[0][1] if states else None
 
 
+def get_pois(session: zenoh.Session, robot: str, poi_id: str = "**", timeout_s: float = TIMEOUT_S) -> list[Poi] | None:
+    """All POIs by id, or the one of this id; none where fusion does not answer.
+
+    No reply comes from an empty registry and from an absent fusion alike, so then its state is asked.
+    """
+    found, _ = get_all(session, topics.POI.key(robot, id=poi_id), Poi, timeout_s=timeout_s)
+    if not found and get_state(session, robot, timeout_s) is None:
+        return None
+    return sorted((poi for _, poi in found), key=lambda poi: poi.poi_id)
+
+
+def get_names(session: zenoh.Session, robot: str) -> dict[str, str]:
+    """Names of the POIs by id; empty where fusion does not answer."""
+    return {poi.poi_id: poi.name for poi in get_pois(session, robot) or []}
+
+
 def get_healths(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) -> list[Health]:
     """The health records of all stages that answer, by stage and instance."""
     healths, _ = get_all(session, topics.HEALTH.key(robot, stage="*"), Health, timeout_s=timeout_s)
     return sorted((health for _, health in healths), key=lambda health: (health.stage, health.instance))
+
+
+def _read(type_: type[T], key: str, sample: zenoh.Sample) -> T:
+    topic = topics.topic_of(key)
+    if topic is None:
+        raise codec.Malformed("a key outside the contract")
+    return codec.decode(type_, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topic.max_bytes)

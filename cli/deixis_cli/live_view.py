@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Protocol, Self
 
+from deixis_runtime.host import SOURCE
+from deixis_schemas import topics
 from deixis_schemas.messages import Belief, CameraInfo, Frame, Message, Target
 from rich.console import Console
 from rich.live import Live
@@ -43,7 +45,7 @@ class LineView:
         self._console = console
         self._summary = Summary(names)
         # The frame's last word: fusion's answer where it runs.
-        self._beat: type[Message] = Belief if "fusion" in stages else Frame
+        self._beat: type[Message] = Belief if topics.BELIEF.stage in stages else Frame
         self._due_s = 0.0
         self._camera = ""
 
@@ -103,7 +105,7 @@ class TableView:
         table = Table(show_header=False, title=f"{summary.clip_s:.1f} s, frame {summary.seq}", title_justify="left")
         frames = f"{summary.camera}, {summary.rate_hz():.0f} frames/s, {summary.drops()} dropped"
         for stage in self._stages:
-            table.add_row(stage, Text(frames if stage == "camera" else summary.words.get(stage, "-")))
+            table.add_row(stage, Text(frames if stage == SOURCE else summary.words.get(stage, "-")))
         if summary.target is not None:
             table.add_row("target", Text(wording.target_line(summary.target, summary.names)))
         for fault in summary.faults():

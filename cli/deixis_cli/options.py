@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 
-from deixis_runtime.host import HostOptions, chosen_stages
+from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
 from deixis_runtime.session import DEFAULT_ENDPOINT
-from deixis_runtime.settings import robot_name
+from deixis_runtime.settings import checked_name
 from deixis_runtime.site import Site, SiteError, load_site
 from deixis_schemas import topics
+
+log = logging.getLogger("deixis")
 
 DEMO_ROBOT = "demo"
 
@@ -21,7 +24,7 @@ class CommandError(Exception):
 def add_robot(parser: argparse.ArgumentParser, default: str | None = None) -> None:
     """--robot; required where there is no default: two robots must never cross-talk by accident."""
     shown = f"name of the robot, the second part of every key{f' (default: {default})' if default else ''}"
-    parser.add_argument("--robot", required=default is None, default=default, type=robot_name, metavar="NAME", help=shown)
+    parser.add_argument("--robot", required=default is None, default=default, type=checked_name, metavar="NAME", help=shown)
 
 
 def add_connect(parser: argparse.ArgumentParser) -> None:
@@ -58,15 +61,22 @@ def add_host(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--registry", type=Path, metavar="FILE", help="SQLite file of the points of interest")
 
 
-def host_options(given: argparse.Namespace, camera: dict[str, str] | None = None, **others: object) -> HostOptions:
-    """The host's options from what `add_host` reads; `camera` holds settings of it. Raises CommandError, HostFailed."""
+def host_options(given: argparse.Namespace, source: dict[str, str] | None = None, **others: object) -> HostOptions:
+    """The host's options from what `add_host` reads; `source` holds settings of the stage that plays it.
+
+    Raises CommandError or HostFailed.
+    """
     stages = chosen_stages(_names(given.only), _names(given.without))
+    absent = set(topics.STAGES) - {*stages, *_names(given.without)}
+    if absent and not given.only:
+        log.warning("not installed here and so not started: %s", ", ".join(sorted(absent)))
     sets = stage_settings(given.sets)
     # Ahead of --set, which so may override them.
-    ours = [f"{name}={value}" for name, value in (camera or {}).items()]
-    sets["camera"] = (*ours, *sets.get("camera", ()))
+    ours = [f"{name}={value}" for name, value in (source or {}).items()]
+    sets[SOURCE] = (*ours, *sets.get(SOURCE, ()))
     if given.registry is not None:
-        sets["fusion"] = (f"registry={quoted(str(given.registry.resolve()))}", *sets.get("fusion", ()))
+        keeper = topics.POI.stage
+        sets[keeper] = (f"registry={quoted(str(given.registry.resolve()))}", *sets.get(keeper, ()))
     for stage in sets:
         if sets[stage] and stage not in stages:
             raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
@@ -95,9 +105,10 @@ def read_site(path: Path | None) -> Site | None:
         site = load_site(path)
     except SiteError as error:
         raise CommandError(str(error)) from None
+    known = known_stages()
     for stage in site.settings:
-        if stage not in topics.STAGES:
-            raise CommandError(f"site file {path}: settings.{stage}: there is no such stage ({', '.join(topics.STAGES)})")
+        if stage not in known:
+            raise CommandError(f"site file {path}: settings.{stage}: there is no such stage ({', '.join(known)})")
     return site
 
 

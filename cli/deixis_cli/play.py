@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import zenoh
-from deixis_runtime.host import Host, HostFailed, HostOptions
+from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
+from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
+from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
-from .gets import get_healths, get_state
+from .gets import get_healths, get_names, get_state
 from .inbox import Inbox, Received
-from .interrupts import Interrupts
 from .play_end import PlayEnd
 from .recorder import Recorder, RecorderError
 
@@ -36,7 +37,8 @@ class PlayResult:
 
     frames: frames seen. targets: the final ones, the last 1000. health: the last record of each stage. counters: messages
     by type under their names; `rejected` (broke the contract), `lost` (we were too slow), `unanswered` (stages that did not
-    answer the last frame). failure: why it did not do its job, or none. signal: of the interrupt, or none.
+    answer the last frame). names: of the POIs by id. failure: why it did not do its job, or none. signal: of the interrupt,
+    or none.
     """
 
     frames: int = 0
@@ -45,6 +47,7 @@ class PlayResult:
     counters: dict[str, int] = field(default_factory=dict)
     camera: CameraInfo | None = None
     state: State | None = None
+    names: dict[str, str] = field(default_factory=dict)
     failure: str | None = None
     signal: int | None = None
     wall_s: float = 0.0
@@ -103,9 +106,11 @@ class Playback:
                 stack.callback(subscriber.undeclare)
 
             host.start(listen, self.interrupts.requested)
-            while not self._is_over():
+            while not self._is_over(host):
                 self._turn(host)
             self._settle(host)
+            if self.result.failure is None and host.given_up:
+                self.result.failure = _said(host.given_up)
 
     def finish(self, wall_s: float) -> PlayResult:
         """The result, complete."""
@@ -126,12 +131,14 @@ class Playback:
 
     def _broken_off(self) -> str | None:
         """Why a recording ended before its end, as a truncated file does; none where it did not."""
-        health = self.result.health.get("camera")
+        health = self.result.health.get(SOURCE)
         return health.reason if self._ended() and health is not None and health.state != "ok" else None
 
-    def _is_over(self) -> bool:
+    def _is_over(self, host: Host) -> bool:
         now_s = time.monotonic()
         self.result.failure = self._end.failure()
+        if self.result.failure is None and SOURCE in host.given_up:  # without it no frame comes any more
+            self.result.failure = _said(host.given_up)
         if self.result.failure is None and self._deadline_s is not None and now_s > self._deadline_s:
             self.result.failure = "the time given to the run is over and the source has not ended"
         return self.result.failure is not None or self.interrupts.requested() or self._end.is_over(now_s)
@@ -163,11 +170,13 @@ class Playback:
             self._counts["unanswered"] += 1
             log.warning("%s: the last frame was not answered", path)
         deadline_s = time.monotonic() + SETTLE_S
-        while "fusion" in self._options.stages:
+        while topics.STATE.stage in self._options.stages:
             self.result.state = state = get_state(host.session, self._options.robot) or self.result.state
             self._turn(host)
             if not self._ended() or self._has_all(state) or time.monotonic() > deadline_s:
                 break
+        if topics.POI.stage in self._options.stages:
+            self.result.names = get_names(host.session, self._options.robot)
         for health in get_healths(host.session, self._options.robot):
             self.result.health[health.stage] = health
 
@@ -179,3 +188,7 @@ class Playback:
         if state is None or state.open_episodes:
             return False
         return {target.episode_id for target in state.recent_targets} <= {target.episode_id for target in self._targets}
+
+
+def _said(given_up: dict[str, str]) -> str:
+    return "; ".join(f"{name} is given up: {why}" for name, why in given_up.items())

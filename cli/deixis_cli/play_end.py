@@ -40,8 +40,8 @@ class PlayEnd:
 
     def unanswered(self) -> list[str]:
         """Topics on which the last frame is not answered."""
-        if self.camera is None or self.camera.last_seq < 0:
-            return [topic.path for topic in self._awaited if topic.path in self._answered]
+        if self.camera is None or self.camera.last_seq < 0:  # there was none
+            return []
         last = FrameId(self.camera.run, self.camera.last_seq)
         return [topic.path for topic in self._awaited if self._answered.get(topic.path) != last]
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import time
 from pathlib import Path
 from typing import Any
 
 import zenoh
 from deixis_runtime.session import open_client
+from deixis_runtime.settings import checked_name
 from deixis_runtime.site import SiteError, load_pois
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Poi
 
-from .gets import get_all, get_state
+from .gets import get_all, get_pois
 from .options import CommandError, add_connect, add_json, add_robot
 
 DEADLINE_S = 5.0
@@ -33,7 +33,7 @@ def register(subparsers: Any) -> None:
     add.add_argument("--extent", type=float, default=0.5, metavar="METRES", help="size across (default: %(default)s)")
     add.add_argument("--tag", action="append", default=[], help="may be given again")
     _place(_action(actions, "move", "give one another position", run_move))
-    _action(actions, "remove", "remove one", run_remove).add_argument("poi_id", metavar="ID", type=poi_id)
+    _action(actions, "remove", "remove one", run_remove).add_argument("poi_id", metavar="ID", type=checked_name)
     many = _action(actions, "import", "add or replace those of a site file, or of a YAML or JSON list", run_import)
     many.add_argument("file", type=Path, metavar="FILE")
 
@@ -41,7 +41,7 @@ def register(subparsers: Any) -> None:
 def run_list(given: argparse.Namespace) -> int:
     """Show all POIs."""
     with open_client(given.connect, shared_memory=False) as session:
-        _show(_all_pois(session, given), given)
+        _show(_pois(session, given), given)
     return 0
 
 
@@ -56,10 +56,10 @@ def run_add(given: argparse.Namespace) -> int:
 def run_move(given: argparse.Namespace) -> int:
     """Give one POI another position."""
     with open_client(given.connect, shared_memory=False) as session:
-        found = {poi.poi_id: poi for poi in _all_pois(session, given)}
-        if given.poi_id not in found:
+        found = _pois(session, given, given.poi_id)
+        if not found:
             raise CommandError(f"poi_id: there is no POI '{given.poi_id}'; use 'deixis poi add'")
-        poi = _checked(**{**found[given.poi_id].model_dump(), "position_m": _position(given)})
+        poi = _checked(**{**found[0].model_dump(), "position_m": _position(given)})
         _show([_edit(session, given, poi.poi_id, poi)], given)
     return 0
 
@@ -84,13 +84,6 @@ def run_import(given: argparse.Namespace) -> int:
     return 0
 
 
-def poi_id(text: str) -> str:
-    """An id, checked, for it becomes the last part of a key. Raises argparse.ArgumentTypeError."""
-    if not re.fullmatch(r"[A-Za-z0-9_.\-]{1,64}", text):
-        raise argparse.ArgumentTypeError(f"'{text}' is not an id of letters, digits, '_', '.' and '-'")
-    return text
-
-
 def _edit(session: zenoh.Session, given: argparse.Namespace, which: str, poi: Poi | None) -> Poi:
     """Put a POI, or delete it where `poi` is none, and wait for the stored one. Raises CommandError."""
     selector = f"{topics.POI.key(given.robot, id=which)}?op={'delete' if poi is None else 'put'}"
@@ -109,16 +102,14 @@ def _edit(session: zenoh.Session, given: argparse.Namespace, which: str, poi: Po
         time.sleep(PAUSE_S)
 
 
-def _all_pois(session: zenoh.Session, given: argparse.Namespace) -> list[Poi]:
-    """All POIs. An empty registry gives no reply, as an absent fusion does, so its state is asked. Raises CommandError."""
+def _pois(session: zenoh.Session, given: argparse.Namespace, which: str = "**") -> list[Poi]:
+    """All POIs, or the one of this id. Raises CommandError where fusion does not answer."""
     deadline_s = time.monotonic() + DEADLINE_S
-    while True:
-        state = get_state(session, given.robot)
-        if state is not None:
-            return state.pois
+    while (found := get_pois(session, given.robot, which)) is None:
         if time.monotonic() > deadline_s:
             raise CommandError(_nobody(given))
         time.sleep(PAUSE_S)
+    return found
 
 
 def _nobody(given: argparse.Namespace) -> str:
@@ -156,6 +147,6 @@ def _position(given: argparse.Namespace) -> tuple[float, float, float]:
 
 
 def _place(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("poi_id", metavar="ID", type=poi_id)
+    parser.add_argument("poi_id", metavar="ID", type=checked_name)
     for axis in ("x_m", "y_m", "z_m"):
         parser.add_argument(axis, type=float, metavar=axis[0].upper(), help="in the map frame, metres")

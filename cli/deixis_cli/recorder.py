@@ -27,14 +27,18 @@ class Recorder:
             folder.mkdir(parents=True, exist_ok=True)
             self._file: TextIO = self.path.open("w", encoding="utf-8")
         except OSError as error:
-            raise RecorderError(f"--out {self.path}: {error.strerror}") from None
+            raise self._error(error) from None
         self._flushed_ns = 0
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        """Raises RecorderError where the last lines cannot be written."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._error(error) from None
 
     def write(self, received: Received) -> None:
         """Append a line. Raises RecorderError, as for a full disk."""
@@ -44,7 +48,10 @@ class Recorder:
                 self._file.flush()
                 self._flushed_ns = received.received_ns
         except OSError as error:
-            raise RecorderError(f"--out {self.path}: {error.strerror}") from None
+            raise self._error(error) from None
+
+    def _error(self, error: OSError) -> RecorderError:
+        return RecorderError(f"--out {self.path}: {error.strerror}")
 
 
 def line_of(received: Received) -> str:

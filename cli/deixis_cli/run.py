@@ -11,8 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from deixis_runtime.host import HostFailed, HostOptions
-from deixis_schemas.messages import Target
+from deixis_runtime.host import SOURCE, HostFailed, HostOptions
 from rich.console import Console
 
 from . import wording
@@ -22,8 +21,6 @@ from .play import PlayResult, play
 from .source import Source, read_source
 
 EXPECTED_MISSED = 1
-
-
 ENOUGH_ANSWERED = 0.8
 
 
@@ -60,7 +57,7 @@ def run(given: argparse.Namespace) -> int:
             on_message=shown.hear if shown else None,
             timeout_s=given.timeout,
         )
-    names |= {poi.poi_id: poi.name for poi in result.state.pois} if result.state else {}
+    names |= result.names
     if given.json:
         print(json.dumps(document(given.robot, given.source, result)))
     else:
@@ -86,7 +83,7 @@ def exit_status(result: PlayResult, *, endless: bool, expected: str | None) -> i
 def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -> None:
     """The final answers, and how the run fared, as text; nothing for a source that gave no frame."""
     for target in result.targets:
-        console.out(_answer_text(target, names), highlight=False)
+        console.out(f"\n{wording.answer_text(target, names)}", highlight=False)
     if not result.frames:
         return
     if not result.targets:
@@ -119,25 +116,13 @@ def document(robot: str, source: str, result: PlayResult) -> dict[str, Any]:
     }
 
 
-def _answer_text(target: Target, names: dict[str, str]) -> str:
-    standing = {poi.poi_id: poi for poi in target.pois}
-    lines = [f"\nPerson {target.person_id} points at: {wording.answer(target, names)}"]
-    for poi_id in target.poi_ids:
-        if poi_id in standing:
-            poi = standing[poi_id]
-            lines.append(
-                f"  {poi_id}: belief {poi.belief:.3f}, plausibility {poi.plausibility:.3f}, pignistic {poi.pignistic:.3f}"
-            )
-    return "\n".join([*lines, f"  conflict {target.conflict:.3f}", f"  {target.reason}"])
-
-
 def _options(given: argparse.Namespace, source: Source) -> tuple[HostOptions, dict[str, str]]:
     site = read_site(given.site)
-    camera = {"source": quoted(source.setting)} | ({"loop": "true"} if given.loop else {})
+    settings = {"source": quoted(source.setting)} | ({"loop": "true"} if given.loop else {})
     try:
-        options = host_options(given, camera, lockstep=given.lockstep)
+        options = host_options(given, settings, lockstep=given.lockstep)
     except HostFailed as error:
         raise CommandError(str(error)) from None
-    if "camera" not in options.stages:
-        raise CommandError("'deixis run' plays a source and so needs the camera; 'deixis up' starts part of the stages")
+    if SOURCE not in options.stages:
+        raise CommandError(f"'deixis run' plays a source and so needs the {SOURCE}; 'deixis up' starts part of the stages")
     return options, {poi.poi_id: poi.name for poi in site.pois} if site else {}

@@ -63,7 +63,7 @@ def document(system: System, endpoint: str) -> dict[str, Any]:
         "missing": system.missing(),
         "doubled": system.doubled(),
         "camera": system.camera.model_dump(mode="json") if system.camera else None,
-        "pois": len(system.state.pois) if system.state else None,
+        "pois": system.state.pois_total if system.state else None,
     }
 
 
@@ -97,7 +97,7 @@ def remarks(system: System) -> list[str]:
         camera = system.camera
         lines.append(f"camera: {camera.state}, {camera.source}, {camera.width} x {camera.height} at {camera.rate_hz:g}/s")
     if system.state is not None:
-        lines.append(f"fusion: {len(system.state.pois)} POIs, {len(system.state.persons)} persons")
+        lines.append(f"fusion: {system.state.pois_total} POIs, {len(system.state.persons)} persons")
     return lines + system.doubled()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from deixis_schemas import topics
 from deixis_schemas.messages import (
     Belief,
     CameraInfo,
@@ -43,16 +44,16 @@ class Summary:
         if isinstance(message, Frame):
             self._hear_frame(message)
         elif isinstance(message, Tracks):
-            self.words["tracker"] = wording.tracked(message)
+            self.words[topics.TRACKS.stage] = wording.tracked(message)
         elif isinstance(message, HeadPoses):
-            self.words["headpose"] = wording.heads(message)
+            self.words[topics.HEAD_POSES.stage] = wording.heads(message)
         elif isinstance(message, Gestures):
-            self.words["gesture"] = wording.gestures(message)
+            self.words[topics.GESTURES.stage] = wording.gestures(message)
         elif isinstance(message, Belief):
             self._answers += 1
             if not self._frames:
                 self._keep_time(message)  # who looks on from afar hears no frames
-            self.words["fusion"] = wording.belief(message, self.names)
+            self.words[topics.BELIEF.stage] = wording.belief(message, self.names)
         elif isinstance(message, Target):
             self.target = message
         elif isinstance(message, Poi):
@@ -78,9 +79,7 @@ class Summary:
         """Everything in one line."""
         frame = f"{self.clip_s:6.1f} s  frame {self.seq}  {self._rate_hz:.0f}/s"
         frame += f"  {self.drops()} dropped" if self._frames else ""
-        return " | ".join(
-            [frame, *(self.words[stage] for stage in ("tracker", "headpose", "gesture", "fusion") if stage in self.words)]
-        )
+        return " | ".join([frame, *(self.words[stage] for stage in topics.STAGES if stage in self.words)])
 
     def _hear_frame(self, frame: Frame) -> None:
         self._frames += 1

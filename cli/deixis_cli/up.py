@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from deixis_runtime.host import Host, HostFailed, HostOptions
+from deixis_runtime.interrupts import Interrupts
 
-from .interrupts import Interrupts
 from .options import add_host, add_robot, host_options, read_site
 
 log = logging.getLogger("deixis-up")
@@ -33,7 +33,10 @@ def register(subparsers: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Run until SIGTERM or Ctrl-C: then 0. Raises HostFailed when a stage or the router is given up."""
+    """Run until SIGTERM or Ctrl-C: then 0. Raises HostFailed when the router or all stages are given up.
+
+    A single stage that is given up leaves the others running: fusion does without its evidence, and says so.
+    """
     read_site(given.site)
     config = given.zenoh_config.resolve() if given.zenoh_config is not None else None
     options = host_options(given, connect=tuple(given.connect), zenoh_config=config, lockstep=given.lockstep)

@@ -9,20 +9,22 @@ from contextlib import ExitStack
 from typing import Any
 
 import zenoh
+from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import open_client
 from deixis_schemas import topics
 from deixis_schemas.messages import Belief, Target
 
 from . import wording
-from .gets import get_state
+from .first_answer import FirstAnswer
+from .gets import get_names, get_state
 from .inbox import Inbox, Received
-from .interrupts import Interrupts
-from .options import add_connect, add_json, add_robot
+from .options import CommandError, add_connect, add_json, add_robot
 from .recorder import line_of
 from .summary import Summary
 
 TURN_S = 0.1
 LINE_EVERY_S = 1.0
+SILENT_S = 3.0
 # No frames: looking on must not pull the pictures over the link.
 WATCHED = (topics.CAMERA_INFO, topics.TRACKS, topics.HEAD_POSES, topics.GESTURES, topics.BELIEF, topics.TARGET)
 
@@ -33,12 +35,21 @@ def register(subparsers: Any) -> None:
     add_robot(parser)
     add_connect(parser)
     parser.add_argument("--seconds", type=float, metavar="N", help="stop after so long (default: on Ctrl-C)")
+    parser.add_argument(
+        "--until-answer", action="store_true", help="print the first final answer alone, also one given before, and stop"
+    )
+    parser.add_argument("--expect", metavar="POI_ID", help="with --until-answer: succeed only if it is exactly this POI")
     add_json(parser, "print JSON lines: each target, and a belief a second")
     parser.set_defaults(run=run)
 
 
 def run(given: argparse.Namespace) -> int:
-    """Watch until interrupted: then 0. Raises Unreachable without a router."""
+    """Watch until interrupted: then 0; with --until-answer 1 when none comes, or another than expected.
+
+    Raises CommandError, or Unreachable without a router.
+    """
+    if given.expect is not None and not given.until_answer:
+        raise CommandError("--expect goes with --until-answer")
     with ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         session = stack.enter_context(open_client(given.connect, shared_memory=False))
@@ -46,11 +57,13 @@ def run(given: argparse.Namespace) -> int:
         for topic in (*WATCHED, topics.POI):
             key = topic.key(given.robot, **({"id": "*"} if topic is topics.POI else {}))
             stack.callback(session.declare_subscriber(key, inbox.store).undeclare)
-        state = get_state(session, given.robot)
-        names = {poi.poi_id: poi.name for poi in state.pois} if state else {}
-        printer = Printer(Summary(names), as_json=given.json)
-        until_s = None if given.seconds is None else time.monotonic() + given.seconds
-        _watch(session, inbox, printer, interrupts, until_s)
+        watch = Watch(session, inbox, interrupts, None if given.seconds is None else time.monotonic() + given.seconds)
+        if given.until_answer:
+            return _until_answer(watch, given)
+        printer = Printer(Summary(get_names(session, given.robot)), as_json=given.json)
+        while watch.goes_on():
+            for received in watch.turn():
+                printer.hear(received, time.monotonic())
     return 0
 
 
@@ -82,19 +95,47 @@ class Printer:
         print(line_of(received).rstrip("\n") if self._as_json else text, flush=True)
 
 
-def _watch(session: zenoh.Session, inbox: Inbox, printer: Printer, interrupts: Interrupts, until_s: float | None) -> None:
-    linked = True
-    silent_since_s: float | None = time.monotonic()
-    while not interrupts.requested() and (until_s is None or time.monotonic() < until_s):
-        inbox.wait(TURN_S)
-        now_s = time.monotonic()
-        heard = inbox.take_all()
-        for received in heard:
-            printer.hear(received, now_s)
-        silent_since_s = None if heard else silent_since_s
-        if silent_since_s is not None and now_s - silent_since_s > 3.0:
+class Watch:
+    """Looks on until interrupted or until its time is over, and says where nothing is to be heard."""
+
+    def __init__(self, session: zenoh.Session, inbox: Inbox, interrupts: Interrupts, until_s: float | None) -> None:
+        self.session = session
+        self._inbox = inbox
+        self._interrupts = interrupts
+        self._until_s = until_s
+        self._linked = True
+        self._silent_since_s: float | None = time.monotonic()
+
+    def goes_on(self) -> bool:
+        """Whether to go on."""
+        return not self._interrupts.requested() and (self._until_s is None or time.monotonic() < self._until_s)
+
+    def turn(self) -> list[Received]:
+        """What came within one turn."""
+        self._inbox.wait(TURN_S)
+        heard = self._inbox.take_all()
+        if heard:
+            self._silent_since_s = None
+        elif self._silent_since_s is not None and time.monotonic() - self._silent_since_s > SILENT_S:
             print("deixis watch: nothing is heard of this robot yet; 'deixis doctor' tells why", file=sys.stderr)
-            silent_since_s = None
-        if bool(session.info.routers_zid()) != linked:
-            linked = not linked
-            print(f"deixis watch: the router is {'back' if linked else 'gone; waiting for it'}", file=sys.stderr)
+            self._silent_since_s = None
+        if bool(self.session.info.routers_zid()) != self._linked:
+            self._linked = not self._linked
+            print(f"deixis watch: the router is {'back' if self._linked else 'gone; waiting for it'}", file=sys.stderr)
+        return heard
+
+
+def _until_answer(watch: Watch, given: argparse.Namespace) -> int:
+    first = FirstAnswer()
+    while first.target is None and watch.goes_on():
+        if first.should_ask(time.monotonic()):
+            first.hear(get_state(watch.session, given.robot))
+        for received in watch.turn():
+            first.hear(received.message)
+    if first.target is not None:
+        names = get_names(watch.session, given.robot)
+        print(first.target.model_dump_json() if given.json else wording.answer_text(first.target, names), flush=True)
+    problem = first.problem(given.expect)
+    if problem:
+        print(f"deixis watch: {problem}", file=sys.stderr)
+    return 1 if problem else 0

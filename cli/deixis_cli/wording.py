@@ -57,6 +57,19 @@ def target_line(target: Target, names: Names) -> str:
     return f"{kind} person {target.person_id}: {answer(target, names)} ({figures}conflict {target.conflict:.2f})"
 
 
+def answer_text(target: Target, names: Names) -> str:
+    """A final target in full: the answer, how each POI in it stands, the conflict and the reason."""
+    standing = {poi.poi_id: poi for poi in target.pois}
+    lines = [f"Person {target.person_id} points at: {answer(target, names)}"]
+    for poi_id in target.poi_ids:
+        if poi_id in standing:
+            poi = standing[poi_id]
+            lines.append(
+                f"  {poi_id}: belief {poi.belief:.3f}, plausibility {poi.plausibility:.3f}, pignistic {poi.pignistic:.3f}"
+            )
+    return "\n".join([*lines, f"  conflict {target.conflict:.3f}", f"  {target.reason}"])
+
+
 def titled(poi_id: str, names: Names) -> str:
     """A POI's name with its id."""
     name = names.get(poi_id, "")

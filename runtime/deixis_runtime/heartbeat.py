@@ -14,6 +14,25 @@ from .inputs import Subscription
 from .outputs import Publisher
 
 PERIOD_S = 1.0
+STEPS_OVER_S = 1.0
+
+
+class StepTimes:
+    """How long the steps of the last second took."""
+
+    def __init__(self) -> None:
+        self._steps: deque[tuple[float, float]] = deque()
+
+    def add(self, took_s: float, now_s: float) -> None:
+        """A step ended now."""
+        self._steps.append((now_s, took_s * 1e3))
+        self.last_second_ms(now_s)
+
+    def last_second_ms(self, now_s: float) -> list[float]:
+        """Times of the steps that ended within the last second, ms."""
+        while self._steps and now_s - self._steps[0][0] > STEPS_OVER_S:
+            self._steps.popleft()
+        return [took_ms for _, took_ms in self._steps]
 
 
 class Heartbeat:
@@ -28,7 +47,7 @@ class Heartbeat:
         self._count = 0
         self._started_s = time.monotonic()
         self._next_s = self._started_s
-        self._steps_ms: deque[float] = deque(maxlen=200)
+        self._steps = StepTimes()
 
     def due_in_s(self) -> float:
         """Seconds until the next record is due."""
@@ -36,7 +55,7 @@ class Heartbeat:
 
     def step_took(self, seconds: float) -> None:
         """Note the time of one step."""
-        self._steps_ms.append(seconds * 1e3)
+        self._steps.add(seconds, time.monotonic())
 
     def beat(self) -> None:
         """Advance the count: the loop runs."""
@@ -45,7 +64,7 @@ class Heartbeat:
 
     def record(self, now_ns: int, inputs: list[Subscription], outputs: list[Publisher]) -> Health:
         """The record as of now."""
-        steps = list(self._steps_ms)
+        steps = self._steps.last_second_ms(time.monotonic())
         return Health(
             stamp_ns=now_ns,
             stage=self._producer.stage,

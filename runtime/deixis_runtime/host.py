@@ -7,6 +7,7 @@ import socket
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -18,16 +19,19 @@ import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health
 
+from .limit import RateLimit
+from .liveliness import AliveStages
 from .router import SOCKET_FOLDER_PREFIX
 from .session import DEFAULT_ENDPOINT, open_client
 from .supervisor import Supervisor
+from .watchdog import Patience, Watchdog
 
 log = logging.getLogger("deixis-supervisor")
 
-READY_TIMEOUT_S = 30.0
 POLL_S = 0.05
-HANGS_AFTER_S = 6.0
-BLIND_AFTER_S = 3.0
+ROUTER = "router"
+SOURCE = topics.FRAME.stage
+"""The stage that all begins with."""
 
 
 class HostFailed(RuntimeError):
@@ -46,25 +50,29 @@ class HostOptions:
     zenoh_config: Path | None = None
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    patience: Patience = field(default_factory=Patience)
 
 
-def installed_stages() -> dict[str, str]:
-    """Stages installed here, by name, with their distribution: the entry-point group `deixis.stages`."""
-    return {item.name: item.dist.name if item.dist else "" for item in entry_points(group="deixis.stages")}
+def installed_stages() -> set[str]:
+    """Names of the stages installed here: the entry points of the group `deixis.stages`."""
+    return {item.name for item in entry_points(group="deixis.stages")}
+
+
+def known_stages() -> tuple[str, ...]:
+    """Stages installed here or named by the topic table: in the order of the table, the others behind by name."""
+    return (*topics.STAGES, *sorted(installed_stages() - set(topics.STAGES)))
 
 
 def chosen_stages(only: tuple[str, ...], without: tuple[str, ...]) -> tuple[str, ...]:
-    """The stages to start: those of the contract, or `only` these, less `without`. Raises HostFailed for unknown ones."""
-    installed = installed_stages()
-    wanted = [name for name in (only or topics.STAGES) if name not in without]
-    known = {*installed, *topics.STAGES}
+    """The stages to start: all that are installed, or `only` these, less `without`. Raises HostFailed for unknown ones."""
+    installed, known = installed_stages(), known_stages()
     for name in (*only, *without):
         if name not in known:
-            raise HostFailed(f"there is no stage '{name}'; installed: {', '.join(sorted(installed)) or 'none'}")
-    for name in wanted:
+            raise HostFailed(f"there is no stage '{name}'; known: {', '.join(known)}")
+    for name in only:
         if name not in installed:
-            raise HostFailed(f"stage '{name}' is not installed here (deixis-{name}); use --except {name}?")
-    return tuple(wanted)
+            raise HostFailed(f"stage '{name}' is not installed here (deixis-{name})")
+    return tuple(name for name in known if name in (only or installed) and name not in without)
 
 
 class Host:
@@ -75,9 +83,10 @@ class Host:
         self.supervisor = Supervisor()
         self.session: zenoh.Session
         self._stack = ExitStack()
-        self._alive: set[str] = set()
-        self._beats: dict[int, tuple[int, float]] = {}
-        self._polled_s = time.monotonic()
+        self._alive: AliveStages
+        self._watchdog = Watchdog(options.patience)
+        self._heard: deque[tuple[int, int, float]] = deque()
+        self._limit = RateLimit()
         self._declared: list[object] = []
         self._stopped: Callable[[], bool] = lambda: False
 
@@ -92,40 +101,44 @@ class Host:
         self._declared.clear()
         self._stack.close()
 
-    def start(self, before_camera: Callable[[], None] | None = None, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Start the router, then the stages, the camera last, when those who look at its frames are ready.
+    @property
+    def given_up(self) -> dict[str, str]:
+        """Stages that ended too often and are not started again, with the reason. The others go on without them."""
+        return {name: why for name, why in self.supervisor.failed().items() if name != ROUTER}
 
-        `before_camera` is called with `session` open and before the first frame: to subscribe. `stopped` says whether to
-        give up waiting. Raises HostFailed.
+    def start(self, before_frames: Callable[[], None] | None = None, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Start the router, then the stages, the source last, when those who look at its frames are ready.
+
+        `before_frames` is called with `session` open and before the first frame: to subscribe. `stopped` says whether to
+        give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
         self._start_router()
-        others = tuple(name for name in self.options.stages if name != "camera")
-        for name in others:
-            self.supervisor.start(name, self._stage_command(name))
-        self._wait_until(lambda: set(others) <= self._alive_stages(), lambda: sorted(set(others) - self._alive_stages()))
-        if before_camera:
-            before_camera()
-        if "camera" in self.options.stages:
-            self.supervisor.start("camera", self._stage_command("camera"))
+        self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
+        if before_frames:
+            before_frames()
+        self._start_stages(tuple(name for name in self.options.stages if name == SOURCE))
 
     def poll(self) -> None:
-        """Watch the children; call it a few times a second. Raises HostFailed when one is given up."""
+        """Watch the children; call it a few times a second. Raises HostFailed when the router or all stages are given up."""
         self.supervisor.poll()
-        now = time.monotonic()
-        # Without a link, or when we ourselves stood still, silence says nothing of the stages.
-        if now - self._polled_s > BLIND_AFTER_S or not self.session.info.routers_zid():
-            self._beats.clear()
-        self._polled_s = now
-        for process in self.supervisor.processes.values():
-            beat = self._beats.get(process.popen.pid) if process.popen else None
-            if beat and process.running and now - beat[1] > HANGS_AFTER_S:
-                self.supervisor.kill(process.name, f"gives no heartbeat for {HANGS_AFTER_S:.0f} s")
-            elif not beat and process.name != "router" and process.running and now - process.spawned_s > READY_TIMEOUT_S:
-                self.supervisor.kill(process.name, f"gave no heartbeat within {READY_TIMEOUT_S:.0f} s of its start")
+        self._end_hanging()
         failed = self.supervisor.failed()
-        if failed:
+        if ROUTER in failed or (self.options.stages and failed.keys() >= set(self.options.stages)):
             raise HostFailed("; ".join(f"{name} is given up: {why}" for name, why in failed.items()))
+
+    def _end_hanging(self) -> None:
+        while self._heard:
+            self._watchdog.beat(*self._heard.popleft())
+        running = {
+            process.name: process.popen.pid
+            for process in self.supervisor.processes.values()
+            if process.name != ROUTER and process.popen is not None and process.running
+        }
+        router = next(iter(self.session.info.routers_zid()), None)
+        hanging = self._watchdog.hanging(running, None if router is None else str(router), time.monotonic())
+        for name, why in hanging.items():
+            self.supervisor.kill(name, why)
 
     def _start_router(self) -> None:
         command = [sys.executable, "-m", "deixis_runtime.router", "--supervised", "--listen", self.endpoint]
@@ -135,16 +148,22 @@ class Host:
             command += ["--connect", endpoint]
         if self.options.zenoh_config:
             command += ["--config", str(self.options.zenoh_config)]
-        self.supervisor.start("router", command)
+        self.supervisor.start(ROUTER, command)
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
-        self._wait_until(path.exists, lambda: ["router"])
+        self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
         self._stack.callback(self._declared.clear)
         robot = self.options.robot
-        self._declared.append(
-            self.session.liveliness().declare_subscriber(topics.alive_key(robot, "*", "*"), self._note_alive, history=True)
-        )
+        self._alive = AliveStages(self.session, robot)
         self._declared.append(self.session.declare_subscriber(topics.HEALTH.key(robot, stage="*"), self._note_health))
+
+    def _start_stages(self, names: tuple[str, ...]) -> None:
+        for name in names:
+            self.supervisor.start(name, self._stage_command(name))
+        self._wait_until(lambda: not self._not_alive(names), lambda: self._not_alive(names))
+
+    def _not_alive(self, names: tuple[str, ...]) -> set[str]:
+        return set(names) - self._alive.stages()
 
     def _stage_command(self, name: str) -> list[str]:
         script = Path(sys.executable).parent / f"deixis-{name}"
@@ -159,8 +178,9 @@ class Host:
             command += ["--set", item]
         return command
 
-    def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], list[str]]) -> None:
-        deadline = time.monotonic() + READY_TIMEOUT_S
+    def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], set[str]]) -> None:
+        ready_s = self.options.patience.ready_s
+        deadline = time.monotonic() + ready_s
         while not ready():
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
@@ -168,25 +188,16 @@ class Host:
             if self._stopped():
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
-                raise HostFailed(f"not ready within {READY_TIMEOUT_S:.0f} s: {', '.join(missing())}")
+                raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
             time.sleep(POLL_S)
-
-    def _alive_stages(self) -> set[str]:
-        return {key.split("/")[-2] for key in tuple(self._alive)}
-
-    def _note_alive(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        if sample.kind == zenoh.SampleKind.PUT:
-            self._alive.add(key)
-        else:
-            self._alive.discard(key)
 
     def _note_health(self, sample: zenoh.Sample) -> None:
         try:
             health = codec.decode(Health, sample.payload.to_bytes(), str(sample.encoding))
         except codec.CodecError as error:
-            log.debug("%s: %s", sample.key_expr, error)
+            # Whoever sends it counts as silent, and is killed for that: the cause has to be said.
+            if self._limit.allow(str(sample.key_expr), time.monotonic()) is not None:
+                log.warning("%s: a heartbeat that breaks the contract: %s", sample.key_expr, error)
             return
-        last = self._beats.get(health.pid)
-        if health.host == socket.gethostname() and (last is None or health.count != last[0]):
-            self._beats[health.pid] = (health.count, time.monotonic())
+        if health.host == socket.gethostname():
+            self._heard.append((health.pid, health.count, time.monotonic()))

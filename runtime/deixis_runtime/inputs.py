@@ -10,8 +10,11 @@ from typing import Generic, TypeVar
 
 import zenoh
 from deixis_schemas import codec
-from deixis_schemas.messages import InputHealth, Message, Produced
+from deixis_schemas.messages import InputHealth, Message, OfFrame, Produced
 from deixis_schemas.topics import Topic
+
+from .age import RelativeAge
+from .rate import Rate
 
 T = TypeVar("T", bound=Message)
 
@@ -23,42 +26,50 @@ class Subscription(Generic[T]):
     """The last `depth` samples of one key.
 
     The Zenoh callback only stores; a FIFO behind a slow consumer would lag without bound. Decoding happens in `take`, in
-    the stage's loop, where a bad payload is counted and reported and never raised.
+    the stage's loop, where a bad payload is counted and reported and never raised. There, too, messages older than the topic
+    allows are dropped: a link that was cut gives out seconds of frames at once when it is mended.
     """
 
     def __init__(
-        self, topic: Topic, key: str, depth: int, wake: Callable[[], None], report: Callable[[str, str], None]
+        self,
+        topic: Topic,
+        key: str,
+        depth: int,
+        wake: Callable[[], None],
+        report: Callable[[str, str], None],
+        *,
+        lockstep: bool = False,
     ) -> None:
+        """In `lockstep` no age is judged: time is that of the frames, which wait for us."""
         self.topic = topic
         self.key = key
         self.received = 0
         self.used = 0
         self.overwritten = 0
         self.rejected = 0
+        self.too_old = 0
         self.last_error = ""
         self.last_error_kind = ""
-        self._too_old = 0
         self._wake = wake
         self._report = report
         self._lock = threading.Lock()
-        self._samples: deque[zenoh.Sample] = deque(maxlen=depth)
+        self._samples: deque[tuple[int, zenoh.Sample]] = deque(maxlen=depth)
         self._heard: dict[str, tuple[float, float]] = {}
         self._accepted_s: float | None = None
-        self._window = (time.monotonic(), 0)
-        self._rate_hz = 0.0
+        self._rate = Rate(time.monotonic())
+        self._max_age_s = None if lockstep else topic.max_age_s
+        self._age = RelativeAge()
+        self._of_last_look = (0, 0)
 
     def store(self, sample: zenoh.Sample) -> None:
         """Callback of the Zenoh subscriber; runs on one of its threads."""
+        received_ns = time.monotonic_ns()
         with self._lock:
             self.received += 1
             if len(self._samples) == self._samples.maxlen:
                 self.overwritten += 1
-            self._samples.append(sample)
+            self._samples.append((received_ns, sample))
         self._wake()
-
-    def pending(self) -> bool:
-        """Whether there is something to take."""
-        return bool(self._samples)
 
     def take(self) -> T | None:
         """The newest valid message not taken yet; older ones are dropped."""
@@ -74,13 +85,18 @@ class Subscription(Generic[T]):
         with self._lock:
             samples = list(self._samples)
             self._samples.clear()
-        messages = [message for sample in samples if (message := self._decode(sample)) is not None]
+        decoded = [(at, message) for at, sample in samples if (message := self._decode(sample)) is not None]
+        messages = self._young(decoded)
+        if messages:
+            self._accepted_s = time.monotonic()
         self.used += len(messages)
         return messages
 
-    def too_old(self) -> None:
-        """Count a message that was dropped for its age."""
-        self._too_old += 1
+    def all_too_old(self) -> bool:
+        """Whether messages came to be taken since the last call, and all of them were dropped for their age."""
+        used, too_old = self._of_last_look
+        self._of_last_look = self.used, self.too_old
+        return self.too_old > too_old and self.used == used
 
     def age_s(self) -> float | None:
         """Seconds since the last accepted message; None if there was none."""
@@ -100,21 +116,16 @@ class Subscription(Generic[T]):
 
     def health(self) -> InputHealth:
         """Counters for the health record."""
-        now = time.monotonic()
-        since, before = self._window
-        if now - since >= 1.0:
-            self._rate_hz = (self.received - before) / (now - since)
-            self._window = (now, self.received)
         return InputHealth(
             key=self.key,
             received=self.received,
             used=self.used,
             overwritten=self.overwritten,
-            too_old=self._too_old,
+            too_old=self.too_old,
             rejected=self.rejected,
             last_error=self.last_error,
             age_s=self.age_s(),
-            rate_hz=round(self._rate_hz, 2),
+            rate_hz=self._rate.of(self.received, time.monotonic()),
             producers=self.producers(),
         )
 
@@ -132,11 +143,30 @@ class Subscription(Generic[T]):
             self.last_error_kind = _KINDS[type(error)]
             self._report(f"rejected {key}", f"{key}: rejected: {error}")
             return None
-        self._accepted_s = time.monotonic()
         self.last_error_kind = ""
         if isinstance(message, Produced):
             self._hear(key, f"{message.stage}/{message.instance}")
         return message  # type: ignore[return-value]
+
+    def _young(self, messages: list[tuple[int, T]]) -> list[T]:
+        limit_s = self._max_age_s
+        if limit_s is None:
+            return [message for _, message in messages]
+        # All are noted before the first is judged: the newest of a backlog tells how old the others are.
+        for received_ns, message in messages:
+            if isinstance(message, OfFrame):
+                self._age.note(message.run, message.seq, message.stamp_ns, received_ns)
+        now_ns = time.monotonic_ns()
+        aged = [(self._age_s(message, now_ns), message) for _, message in messages]
+        young = [message for age_s, message in aged if age_s <= limit_s]
+        if len(young) < len(aged):
+            self.too_old += len(aged) - len(young)
+            oldest_s = max(age_s for age_s, _ in aged)
+            self._report(f"age {self.key}", f"{self.key}: dropped, {oldest_s:.1f} s old; the limit is {limit_s:g} s")
+        return young
+
+    def _age_s(self, message: T, now_ns: int) -> float:
+        return self._age.age_s(message.stamp_ns, now_ns) if isinstance(message, OfFrame) else 0.0
 
     def _hear(self, key: str, who: str) -> None:
         now = time.monotonic()

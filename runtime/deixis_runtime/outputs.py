@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import zenoh
 from deixis_schemas import codec
@@ -10,19 +11,23 @@ from deixis_schemas.messages import Message, OutputHealth
 from deixis_schemas.topics import Topic
 
 from .delivery import PROFILES
+from .rate import Rate
 
 
 class Publisher:
     """Publishes messages of one topic on one key."""
 
-    def __init__(self, session: zenoh.Session, topic: Topic, key: str, *, lossless: bool = False) -> None:
+    def __init__(
+        self, session: zenoh.Session, topic: Topic, key: str, report: Callable[[str, str], None], *, lossless: bool = False
+    ) -> None:
         """`lossless` waits where a link is full instead of dropping: for lockstep, where a lost frame makes runs differ."""
         profile = PROFILES[topic.delivery]
         self.key = key
         self.published = 0
+        self.oversized = 0
         self._topic = topic
-        self._window = (time.monotonic(), 0)
-        self._rate_hz = 0.0
+        self._report = report
+        self._rate = Rate(time.monotonic())
         self._publisher = session.declare_publisher(
             key,
             encoding=codec.encoding_of(topic.type),
@@ -32,10 +37,18 @@ class Publisher:
         )
 
     def put(self, message: Message) -> None:
-        """Publish. Raises TypeError for a message of another type than the topic's."""
+        """Publish, unless the message is larger than the topic allows: readers would refuse it, so it is counted and said.
+
+        Raises TypeError for a message of another type than the topic's.
+        """
         if type(message) is not self._topic.type:
             raise TypeError(f"{self.key} carries {self._topic.type.__name__}, not {type(message).__name__}")
-        self._publisher.put(codec.encode(message))
+        payload = codec.encode(message)
+        if len(payload) > self._topic.max_bytes:
+            self.oversized += 1
+            self._report(f"size {self.key}", f"{self.key}: not published: {oversize(len(payload), self._topic)}")
+            return
+        self._publisher.put(payload)
         self.published += 1
 
     def matching(self) -> bool:
@@ -44,9 +57,10 @@ class Publisher:
 
     def health(self) -> OutputHealth:
         """Counters for the health record."""
-        now = time.monotonic()
-        since, before = self._window
-        if now - since >= 1.0:
-            self._rate_hz = (self.published - before) / (now - since)
-            self._window = (now, self.published)
-        return OutputHealth(key=self.key, published=self.published, rate_hz=round(self._rate_hz, 2))
+        rate_hz = self._rate.of(self.published, time.monotonic())
+        return OutputHealth(key=self.key, published=self.published, oversized=self.oversized, rate_hz=rate_hz)
+
+
+def oversize(size: int, topic: Topic) -> str:
+    """What is wrong with a payload of `size` bytes that the topic does not allow, in words."""
+    return f"{size} bytes, more than the {topic.max_bytes} that '{topic.path}' allows"

@@ -11,9 +11,16 @@ from typing import Literal
 import zenoh
 from deixis_schemas import codec
 from deixis_schemas.messages import Message
+from deixis_schemas.topics import Topic
+
+from .outputs import oversize
 
 MAX_WAITING = 64
-MAX_PAYLOAD_BYTES = 1 << 20
+# Edits are small and each counts: a registry put POI by POI comes in one burst. Only a flood gets here.
+MAX_EDITS = 10_000
+MAX_EDIT_BYTES = 32 << 20
+
+Report = Callable[[str, str], None]
 
 
 class Refused(ValueError):
@@ -44,28 +51,25 @@ Answer = Callable[[Query], list[tuple[str, Message]]]
 
 
 class QueryQueue:
-    """Gets on one key expression, waiting for the loop."""
+    """Gets on one key expression of a topic, waiting for the loop."""
 
-    def __init__(self, answer: Answer, wake: Callable[[], None], report: Callable[[str, str], None]) -> None:
+    def __init__(self, topic: Topic, answer: Answer, wake: Callable[[], None], report: Report) -> None:
+        self.lost = 0
+        self._topic = topic
         self._answer = answer
         self._wake = wake
         self._report = report
         self._lock = threading.Lock()
         self._waiting: deque[zenoh.Query] = deque()
-        self.refused = 0
 
     def store(self, query: zenoh.Query) -> None:
-        """Callback of the Zenoh queryable. Past the bound the oldest is dropped, which the asker sees as no answer."""
+        """Callback of the Zenoh queryable. Past the bound the oldest is lost, which its asker sees as no answer."""
         with self._lock:
             if len(self._waiting) >= MAX_WAITING:
                 self._waiting.popleft()
-                self.refused += 1
+                self.lost += 1
             self._waiting.append(query)
         self._wake()
-
-    def pending(self) -> bool:
-        """Whether somebody waits."""
-        return bool(self._waiting)
 
     def answer_all(self) -> None:
         """Answer everybody who waits; called from the loop."""
@@ -80,7 +84,6 @@ class QueryQueue:
             try:
                 self._reply(query)
             except Refused as error:
-                self.refused += 1
                 query.reply_err(str(error).encode(), encoding="text/plain")
         except zenoh.ZError as error:
             self._report(f"reply {query.key_expr}", f"{query.key_expr}: cannot reply: {error}")
@@ -93,46 +96,51 @@ class QueryQueue:
         if wanted not in ("msgpack", "json"):
             raise Refused(f"format: '{wanted[:40]}' is neither 'msgpack' nor 'json'")
         payload = query.payload.to_bytes() if query.payload is not None else None
-        if payload is not None and len(payload) > MAX_PAYLOAD_BYTES:
-            raise Refused(f"payload: {len(payload)} bytes, more than {MAX_PAYLOAD_BYTES}")
+        if payload is not None and len(payload) > self._topic.max_bytes:
+            raise Refused(f"payload: {oversize(len(payload), self._topic)}")
         encoding = str(query.encoding) if query.encoding is not None else ""
         for key, message in self._answer(Query(str(query.key_expr), parameters, payload, encoding)):
-            if wanted == "json":
-                query.reply(key, codec.encode_json(message), encoding=codec.JSON)
-            else:
-                query.reply(key, codec.encode(message), encoding=codec.encoding_of(type(message)))
+            content = codec.encode_json(message) if wanted == "json" else codec.encode(message)
+            if len(content) > self._topic.max_bytes:
+                what = f"{key}: reply of {oversize(len(content), self._topic)}"
+                self._report(f"reply size {key}", what)
+                raise Refused(f"{what}; ask for less, with ?top=N or ?poi=ID")
+            query.reply(key, content, encoding=codec.JSON if wanted == "json" else codec.encoding_of(type(message)))
 
 
 class EditQueue:
     """Puts and deletes on one key expression, waiting for the loop in their order."""
 
-    def __init__(self, wake: Callable[[], None], report: Callable[[str, str], None]) -> None:
+    def __init__(self, wake: Callable[[], None], report: Report) -> None:
+        self.lost = 0
         self._wake = wake
         self._report = report
         self._lock = threading.Lock()
         self._waiting: deque[zenoh.Sample] = deque()
-        self.overflowed = 0
+        self._bytes = 0
+        self._said = 0
 
     def store(self, sample: zenoh.Sample) -> None:
-        """Callback of the Zenoh subscriber. Past the bound the newest is refused: an edit already heard is not forgotten."""
+        """Callback of the Zenoh subscriber. Past the bounds the newest is lost: an edit already heard is not forgotten."""
+        size = len(sample.payload)
         with self._lock:
-            if len(self._waiting) >= MAX_WAITING:
-                self.overflowed += 1
+            if len(self._waiting) >= MAX_EDITS or self._bytes + size > MAX_EDIT_BYTES:
+                self.lost += 1
             else:
                 self._waiting.append(sample)
+                self._bytes += size
         self._wake()
-
-    def pending(self) -> bool:
-        """Whether there is something to take."""
-        return bool(self._waiting)
 
     def take_all(self) -> list[Edit]:
         """All edits heard since the last call."""
         with self._lock:
             samples = list(self._waiting)
             self._waiting.clear()
-        if self.overflowed:
-            self._report("edits", f"{self.overflowed} edits refused so far: more than {MAX_WAITING} waited at once")
+            self._bytes = 0
+        if self.lost > self._said:
+            self._said = self.lost
+            bounds = f"{MAX_EDITS} edits or {MAX_EDIT_BYTES} bytes"
+            self._report("edits lost", f"{self.lost} edits lost so far: more than {bounds} waited at once")
         return [_edit_of(sample) for sample in samples]
 
 

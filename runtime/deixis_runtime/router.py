@@ -10,12 +10,11 @@ import json
 import logging
 import os
 import shutil
-import signal
-import threading
 from pathlib import Path
 
 import zenoh
 
+from .interrupts import Interrupts
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
 
@@ -56,9 +55,13 @@ def main(argv: list[str] | None = None) -> int:
     setup_logging()
     zenoh.init_log_from_env_or("error")
     parent = os.getppid() if given.supervised else None
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    with Interrupts() as interrupts:
+        status = _route(given, interrupts, parent)
+    exit_now(status)
+    return status
+
+
+def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None) -> int:
     try:
         session = zenoh.open(router_config(given.listen, given.connect, given.config))
     except Unreachable as error:
@@ -69,17 +72,16 @@ def main(argv: list[str] | None = None) -> int:
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
-    _watch_links(session, given.listen, given.connect, stop, parent)
+    _watch_links(session, given.listen, given.connect, interrupts, parent)
     close(session)
-    exit_now(0)
     return 0
 
 
 def _watch_links(
-    session: zenoh.Session, listen: list[str], connect: list[str], stop: threading.Event, parent: int | None
+    session: zenoh.Session, listen: list[str], connect: list[str], interrupts: Interrupts, parent: int | None
 ) -> None:
     linked: bool | None = None
-    while not stop.wait(CHECK_S):
+    while not interrupts.wait(CHECK_S):
         if parent is not None and os.getppid() != parent:
             log.error("the supervisor is gone; stopping")
             _remove_socket_folders(listen)

@@ -83,8 +83,9 @@ def close(session: zenoh.Session) -> None:
 
 def exit_now(status: int) -> None:
     """Leave the process at once, after flushing: Rust threads of a session that would not close keep it alive otherwise."""
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):  # nobody reads any more, as in `deixis watch | head`
+            stream.flush()
     os._exit(status)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
+from deixis_schemas import topics
 from deixis_schemas.codec import say
 from deixis_schemas.messages import NAME_PATTERN
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -53,17 +54,17 @@ class CommonOptions:
 
 
 def parse_options(stage: str, description: str, argv: list[str] | None) -> CommonOptions:
-    """Read the command line of a stage. Raises ConfigError for a bad site file or name; SystemExit for bad usage."""
+    """Read the command line of a stage. Raises ConfigError for a bad site file or environment; SystemExit for bad usage."""
     parser = argparse.ArgumentParser(prog=f"deixis-{stage}", description=description)
-    parser.add_argument("--robot", required=True, type=robot_name, help="name of the robot, the second part of every key")
+    parser.add_argument("--robot", required=True, type=checked_name, help="name of the robot, the second part of every key")
     parser.add_argument("--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (default: %(default)s)")
     parser.add_argument("--site", type=Path, metavar="FILE", help="site file: camera, walls, points of interest, settings")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="sets", help="override one setting")
-    parser.add_argument("--instance", default=None, help="name of this process (default: host and process number)")
+    parser.add_argument("--instance", type=checked_name, help="name of this process (default: host and process number)")
     parser.add_argument("--lockstep", action="store_true", help="time is that of the frames; for reproducible runs")
     parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
     given = parser.parse_args(argv)
-    before = int(os.environ.get(STARTED_BEFORE, "0"))
+    before = started_before(os.environ.get(STARTED_BEFORE, "0"))
     try:
         site = load_site(given.site) if given.site else None
     except SiteError as error:
@@ -85,7 +86,7 @@ def load_config(stage: str, model: type[C], options: CommonOptions) -> C:
     content: dict[str, Any] = {}
     if options.site is not None:
         content |= options.site.settings.get(stage, {})
-        content |= options.site.camera if stage == "camera" else {}
+        content |= options.site.camera if stage == topics.FRAME.stage else {}
     for item in options.sets:
         name, separator, text = item.partition("=")
         if not separator:
@@ -98,13 +99,20 @@ def load_config(stage: str, model: type[C], options: CommonOptions) -> C:
         raise ConfigError(f"settings of {stage}: {say(error)}{where}") from None
 
 
-def robot_name(text: str) -> str:
-    """A robot's name, checked: it becomes one part of every key. Raises argparse.ArgumentTypeError."""
+def checked_name(text: str) -> str:
+    """A name from the command line, checked: it becomes one part of a key. Raises argparse.ArgumentTypeError."""
     if not re.fullmatch(NAME_PATTERN, text):
         raise argparse.ArgumentTypeError(
-            f"'{text}' is not a name of letters, digits, '_', '.' and '-', beginning with one of the first"
+            f"'{text}' is not a name: 64 letters, digits, '_', '.' and '-' at most, not beginning with '.' or '-'"
         )
     return text
+
+
+def started_before(text: str) -> int:
+    """How often the supervisor has started this stage before, from its environment variable. Raises ConfigError."""
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise ConfigError(f"{STARTED_BEFORE}: '{text[:40]}' is not a number of starts")
+    return int(text)
 
 
 def lockstep_instance(started_before: int) -> str:
@@ -114,7 +122,7 @@ def lockstep_instance(started_before: int) -> str:
 
 def default_instance() -> str:
     """Name of this process: host and process number."""
-    host = re.sub(r"[^A-Za-z0-9_.\-]", "-", socket.gethostname())[:40] or "host"
+    host = re.sub(r"[^A-Za-z0-9_.\-]", "-", socket.gethostname()).lstrip(".-")[:40] or "host"
     return f"{host}-{os.getpid()}"
 
 

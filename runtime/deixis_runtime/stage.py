@@ -21,7 +21,8 @@ from .delivery import PROFILES
 from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
-from .outputs import Publisher
+from .liveliness import AliveStages
+from .outputs import Publisher, oversize
 from .queries import Answer, EditQueue, Query, QueryQueue
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
@@ -31,7 +32,9 @@ C = TypeVar("C", bound=StageConfig)
 EXIT_CONFIG = 78
 EXIT_UNREACHABLE = 69
 IDLE_WAIT_S = 0.25
-MAX_COUNTERS = 64
+# A signal handler may set a plain attribute only (`threading.Event.set` can deadlock in one): `wait` looks this often.
+STOP_POLL_S = 0.1
+MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 
 
 class Node:
@@ -50,25 +53,23 @@ class Node:
         self._parent = os.getppid() if options.supervised else None
         self._event = threading.Event()
         self._limit = RateLimit()
-        self._reports: list[tuple[str, str]] = []
         self._heartbeat = Heartbeat(self.producer)
         self._inputs: list[Subscription] = []
         self._outputs: list[Publisher] = []
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
-        self._alive: set[str] = set()
+        self._alive = AliveStages(session, self.robot, self.wake)
         self._token: Any = None
         self._health = self.publish(topics.HEALTH)
-        self.serve_get(self._health.key, self._answer_health)
-        self._watch_alive()
+        self.serve_get(topics.HEALTH, self._answer_health, stage=stage)
 
     # --- keys ---------------------------------------------------------------------------------------------------------
 
     def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
         """Listen to a topic and keep its newest `depth` samples."""
         key = topic.key(self.robot)
-        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn)
+        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn, lockstep=self.lockstep)
         self._declared.append(self._session.declare_subscriber(key, subscription.store))
         self._inputs.append(subscription)
         return subscription
@@ -83,7 +84,7 @@ class Node:
     def publish(self, topic: Topic) -> Publisher:
         """A publisher of a topic of this stage."""
         key = topic.key(self.robot, stage=self.producer.stage)
-        publisher = Publisher(self._session, topic, key, lossless=self.lockstep)
+        publisher = Publisher(self._session, topic, key, self.warn, lossless=self.lockstep)
         self._outputs.append(publisher)
         return publisher
 
@@ -94,32 +95,40 @@ class Node:
         if message is None:
             self._session.delete(key, priority=profile.priority, express=profile.express, allowed_destination=remote)
             return
+        payload = codec.encode(message)
+        if len(payload) > topic.max_bytes:
+            self.count("announcements_oversized")
+            self.warn(f"size {key}", f"{key}: not published: {oversize(len(payload), topic)}")
+            return
         self._session.put(
             key,
-            codec.encode(message),
+            payload,
             encoding=codec.encoding_of(type(message)),
             priority=profile.priority,
             express=profile.express,
             allowed_destination=remote,
         )
 
-    def serve_get(self, key: str, answer: Answer) -> None:
-        """Answer gets on a key expression; `answer` is called in the loop, from `wait`."""
-        queue = QueryQueue(answer, self.wake, self.warn)
-        self._declared.append(self._session.declare_queryable(key, queue.store))
+    def serve_get(self, topic: Topic, answer: Answer, **parts: str) -> None:
+        """Answer gets on a topic, or `parts` of it (`id="**"`); `answer` is called in the loop, from `wait`.
+
+        A reply that is larger than the topic allows becomes an error that says so.
+        """
+        queue = QueryQueue(topic, answer, self.wake, self.warn)
+        self._declared.append(self._session.declare_queryable(topic.key(self.robot, **parts), queue.store))
         self._queries.append(queue)
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
-        return {key.split("/")[-2] for key in tuple(self._alive)}
+        return self._alive.stages()
 
     # --- loop ---------------------------------------------------------------------------------------------------------
 
     def wait(self, timeout_s: float = IDLE_WAIT_S) -> bool:
-        """Wait for input, at most `timeout_s`; answer gets and send the heartbeat. False when the stage has to stop."""
+        """Wait for input, at most `timeout_s` and often less; answer gets and send the heartbeat. False: stop the stage."""
         if self._token is None:
             self._declare_alive()
-        self._event.wait(min(timeout_s, self._heartbeat.due_in_s()))
+        self._event.wait(min(timeout_s, self._heartbeat.due_in_s(), STOP_POLL_S))
         self._event.clear()
         for queue in self._queries:
             queue.answer_all()
@@ -132,9 +141,8 @@ class Node:
         self._event.set()
 
     def stop(self) -> None:
-        """Make the stage stop; may be called from any thread and from a signal handler."""
+        """Make the stage stop within STOP_POLL_S; may be called from any thread and from a signal handler."""
         self.stopping = True
-        self._event.set()
 
     @contextmanager
     def step(self) -> Iterator[None]:
@@ -184,6 +192,7 @@ class Node:
 
     def _beat(self) -> None:
         self._heartbeat.beat()
+        self._look_at_queues()
         self._health.put(self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))
         if self._parent is not None and os.getppid() != self._parent:
             self.log.error("the supervisor is gone; stopping")
@@ -199,17 +208,17 @@ class Node:
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
-    def _watch_alive(self) -> None:
-        def note(sample: zenoh.Sample) -> None:
-            key = str(sample.key_expr)
-            if sample.kind == zenoh.SampleKind.PUT:
-                self._alive.add(key)
-            else:
-                self._alive.discard(key)
-            self.wake()
-
-        key = topics.alive_key(self.robot, "*", "*")
-        self._declared.append(self._session.liveliness().declare_subscriber(key, note, history=True))
+    def _look_at_queues(self) -> None:
+        """What was lost or dropped before the stage saw it is said in health."""
+        for name, lost in (
+            ("edits_lost", sum(queue.lost for queue in self._edits)),
+            ("gets_lost", sum(queue.lost for queue in self._queries)),
+        ):
+            if lost:
+                self._heartbeat.counters[name] = lost
+        for item in self._inputs:
+            late = item.all_too_old()
+            self.note(f"age {item.key}", f"{item.key}: all that comes is too old and is dropped" if late else None)
 
 
 def run_stage(

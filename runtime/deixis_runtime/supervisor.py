@@ -20,6 +20,8 @@ RESTART_WINDOW_S = 60.0
 BACKOFF_S = 0.5
 BACKOFF_MAX_S = 8.0
 STOP_TIMEOUT_S = 4.0
+KILL_TIMEOUT_S = 1.0
+SIGNALS = {number.value: number.name for number in signal.Signals}
 
 
 @dataclass
@@ -30,7 +32,6 @@ class Process:
     argv: list[str]
     popen: subprocess.Popen[bytes] | None = None
     restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
-    spawned_s: float = 0.0
     started: int = 0
     start_again_s: float | None = None
     given_up: str = ""
@@ -92,14 +93,23 @@ class Supervisor:
         except subprocess.TimeoutExpired:
             log.warning("%s does not stop; killing it", process.name)
             process.popen.kill()
-            process.popen.wait()
+            self._await_killed(process.popen, process.name)
+
+    def _await_killed(self, popen: subprocess.Popen[bytes], name: str) -> None:
+        try:
+            popen.wait(KILL_TIMEOUT_S)
+        except subprocess.TimeoutExpired:  # within a system call that does not return, as of a broken device
+            log.error("%s (process %d) cannot be killed; it is left behind", name, popen.pid)
 
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
-        process.spawned_s = time.monotonic()
         environment = {**os.environ, STARTED_BEFORE: str(process.started)}
         process.started += 1
-        process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+        try:
+            process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+        except OSError as error:
+            process.given_up = f"it cannot be started: {error.strerror}"
+            log.error("%s is given up: %s", process.name, process.given_up)
 
     def _plan_restart(self, process: Process) -> None:
         assert process.popen is not None
@@ -120,7 +130,7 @@ class Supervisor:
 def say_status(status: int) -> str:
     """An exit status in words."""
     if status < 0:
-        return f"killed by {signal.Signals(-status).name}"
+        return f"killed by {SIGNALS.get(-status, f'signal {-status}')}"
     if status == EXIT_UNREACHABLE:
         return "no router, or its endpoint is taken"
     return f"status {status}"

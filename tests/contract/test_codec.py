@@ -57,9 +57,9 @@ def test_a_truncated_message_is_malformed(sample, data):
 
 def test_another_version_is_told_from_another_type():
     payload = codec.encode(TRACKS)
-    with pytest.raises(codec.WrongVersion, match="version '2'"):
-        codec.decode(m.Tracks, payload, "application/msgpack;Tracks/2")
-    with pytest.raises(codec.WrongType, match="expected 'application/msgpack;Tracks/1'"):
+    with pytest.raises(codec.WrongVersion, match="version '3'"):
+        codec.decode(m.Tracks, payload, "application/msgpack;Tracks/3")
+    with pytest.raises(codec.WrongType, match="expected 'application/msgpack;Tracks/2'"):
         codec.decode(m.Tracks, payload, "application/msgpack;Frame/1")
     with pytest.raises(codec.WrongType):
         codec.decode(m.Tracks, payload, "zenoh/bytes")

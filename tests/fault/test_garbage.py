@@ -20,7 +20,7 @@ HEARD_BY = {  # the keys that stages listen to, and one stage that hears each
     "gesture/gestures": "fusion",
     "robot/pose": "fusion",
 }
-FRAME = Frame(stamp_ns=1, stage="camera", instance="x", seq=1, width=1, height=1, encoding="bgr8", data=b"abc")
+FRAME = Frame(stamp_ns=1, stage="camera", instance="x", run=1, seq=1, width=1, height=1, encoding="bgr8", data=b"abc")
 NAN = float("nan")
 NOT_NUMBERS = {  # a field of each type; the others ignore what they do not know
     "width": float("inf"),

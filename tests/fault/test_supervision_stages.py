@@ -1,8 +1,10 @@
 """Stages that die, hang or are misconfigured, under `deixis up` and `deixis run`."""
 
+import json
 import os
 import signal
 import subprocess
+import time
 import uuid
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 from deixis_cli.gets import get_healths
 from deixis_runtime.session import open_client
-from running import answers, command, free_port, process, tail, wait_until
+from running import answers, child_called, children, command, free_port, get_one, process, tail, wait_until
 
 STAGES = "camera,fusion"  # the two that start quickest
 
@@ -87,9 +89,13 @@ class Up:
         return sum(item.published for item in health.outputs if item.key.endswith("/camera/frame")) if health else 0
 
 
-def children(pid):
-    """Process numbers of the children of a process."""
-    return [int(line) for line in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+def give_up(supervisor, stage, log):
+    """Kill a stage each time it is started, until the supervisor gives it up."""
+    while f"{stage} is given up" not in log.read_text():
+        pid = child_called(supervisor, f"deixis-{stage}")
+        if pid is not None:
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.1)
 
 
 def runs(pid):
@@ -140,10 +146,7 @@ def test_a_killed_supervisor_leaves_no_orphan_after_three_seconds(up, wait_for):
 def test_a_killed_router_is_started_again_and_its_stages_come_back(lasting_up):
     up = lasting_up
     camera = up.wait_for_pid("camera")
-    router = next(
-        pid for pid in children(up.child.pid) if b"deixis_runtime.router" in Path(f"/proc/{pid}/cmdline").read_bytes()
-    )
-    os.kill(router, signal.SIGKILL)
+    os.kill(child_called(up.child.pid, "deixis_runtime.router"), signal.SIGKILL)
     wait_until(lambda: "router ended (killed by SIGKILL)" in up.log.read_text(), "it is noticed", 10, up.log)
     assert up.wait_for_pid("camera") == camera, "the camera itself went on"
     assert up.child.poll() is None
@@ -195,3 +198,47 @@ def test_a_source_that_is_no_video_ends_the_run_with_its_cause(tmp_path, robot, 
     assert ended.returncode == 1
     assert "deixis run: " in ended.stderr
     assert "notes.mp4" in ended.stderr
+
+
+@pytest.mark.slow
+def test_a_stage_that_is_given_up_degrades_the_system_and_the_run_says_so_at_its_end(tmp_path, robot, endpoint, pictures):
+    log = tmp_path / "log"
+    argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", "camera,fusion,gesture")
+    argv += ["--json", "--set", "camera.rate_hz=0.2", "--registry", str(tmp_path / "pois.sqlite")]
+    with log.open("wb") as file, subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=file) as run:
+        try:
+            wait_until(lambda: answers(endpoint), "a router", 30, log)
+            with open_client(endpoint, shared_memory=False) as session:
+                key = f"deixis/{robot}/camera/info"
+                wait_until(lambda: (info := get_one(session, key)) and info["state"] == "streaming", "frames", 30, log)
+            give_up(run.pid, "gesture", log)
+            out, _ = run.communicate(timeout=40)
+        finally:
+            run.kill()
+    read = json.loads(out)
+    assert run.returncode == 1
+    assert read["failure"].startswith("gesture is given up: it ended")
+    assert read["camera"]["state"] == "ended", "it was played to its end"
+    assert read["frames"] == 5
+    assert log.read_text().count("gesture is given up") == 2, "logged once, and told at the end"
+
+
+@pytest.mark.slow
+def test_a_camera_that_is_given_up_ends_the_run_for_nothing_comes_any_more(tmp_path, robot, endpoint, pictures):
+    log = tmp_path / "log"
+    argv = command("deixis", "run", pictures, "--robot", robot, "--listen", endpoint, "--only", "camera,gesture", "--loop")
+    with process(argv, log) as run:
+        wait_until(lambda: "streaming" in log.read_text(), "frames", 30, log)
+        give_up(run.pid, "camera", log)
+        assert run.wait(20) == 1
+    assert "deixis run: camera is given up: it ended" in log.read_text()
+
+
+@pytest.mark.slow
+def test_up_goes_on_without_a_stage_that_is_given_up_and_ends_when_none_is_left(up):
+    give_up(up.child.pid, "fusion", up.log)
+    before = up.frames()
+    wait_until(lambda: up.frames() > before + 5, "the camera goes on", 10, up.log)
+    assert up.child.poll() is None
+    give_up(up.child.pid, "camera", up.log)
+    assert up.child.wait(10) == 1

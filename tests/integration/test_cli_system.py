@@ -84,6 +84,31 @@ def test_watch_prints_answers_as_json_lines(ask):
     assert {"key", "type", "seq", "stamp_ns", "received_ns", "message"} == set(read[0])
 
 
+def test_watch_until_answer_prints_the_first_one_and_judges_it(ask, running):
+    running.wait_until(lambda: running.state().get("recent_targets"), "an answer", 60)
+    first = " or ".join(running.state()["recent_targets"][0]["poi_ids"])
+    status, out, err = ask("watch", "--until-answer", "--seconds", "30", "--expect", first)
+    assert (status, err) == (0, "")
+    assert out.startswith("Person ")
+    assert "conflict" in out
+    status, _, err = ask("watch", "--until-answer", "--seconds", "30", "--expect", "P8")
+    assert status == 1
+    assert f"expected the one answer 'P8', but got: {first}" in err
+
+
+def test_watch_until_answer_has_an_end_where_none_comes(ask):
+    status, out, err = ask("watch", "--until-answer", "--seconds", "1", robot="nobody")
+    assert (status, out) == (1, "")
+    assert "no final answer came" in err
+
+
+def test_a_reader_that_goes_away_is_no_crash(running):
+    watch = " ".join(command("deixis", "watch", "--robot", ROBOT, "--connect", running.endpoint, "--json"))
+    ended = subprocess.run(["sh", "-c", f"{watch} | head -n 1"], capture_output=True, text=True, timeout=30, check=False)
+    assert ended.stdout.count("\n") == 1
+    assert "Traceback" not in ended.stderr
+
+
 def test_a_poi_is_added_moved_listed_and_removed_each_edit_acknowledged(ask, running):
     status, out, _ = ask("poi", "add", "lamp", "1", "-2.5", "0.75", "--name", "the lamp", "--tag", "light", "--json")
     lamp = {"poi_id": "lamp", "name": "the lamp", "position_m": [1.0, -2.5, 0.75], "extent_m": 0.5, "tags": ["light"]}

@@ -10,6 +10,7 @@ from running import ROOT, free_port
 BASE = "python:3.11-slim-bookworm"
 STAND_IN = ROOT.parent / "shared" / "tools" / "base-image"
 STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
+ROUTER = "unixsock-stream//run/deixis/router.sock"
 BUILD_TIMEOUT_S = 900
 RUN_TIMEOUT_S = 240
 
@@ -90,7 +91,7 @@ def images(compose):
 def test_the_demo_names_the_poi_and_succeeds(compose):
     environment = {"DEIXIS_PUBLISH": f"127.0.0.1:{free_port()}", "DEIXIS_ROBOT": "demo", "DEIXIS_OPTIONS": "--lockstep"}
     done = compose("deixis-test", "demo", "up", "--exit-code-from", "demo", timeout=RUN_TIMEOUT_S, **environment)
-    assert "points at: P3" in done.stdout
+    assert "points at: the ship model (P3)" in done.stdout
 
 
 @pytest.mark.usefixtures("images")
@@ -107,13 +108,13 @@ def test_robot_and_edge_name_the_poi_over_a_network(compose):
     run("docker", "network", "connect", "deixis-test-edge_default", robot)
 
     (fusion,) = containers("deixis-test-edge", "fusion")
-    ask = ("docker", "exec", fusion, "python", "/etc/deixis/await_answer.py", "r1")
-    right = run(*ask, "P3", timeout=RUN_TIMEOUT_S, check=False)
+    ask = ("docker", "exec", fusion, "deixis", "watch", "--robot", "r1", "--connect", ROUTER, "--until-answer")
+    right = run(*ask, "--seconds", "120", "--expect", "P3", timeout=RUN_TIMEOUT_S, check=False)
     assert right.returncode == 0, right.stdout + right.stderr
-    assert "points at: P3" in right.stdout
-    wrong = run(*ask, "P8", timeout=RUN_TIMEOUT_S, check=False)
+    assert "points at: the ship model (P3)" in right.stdout
+    wrong = run(*ask, "--seconds", "120", "--expect", "P8", timeout=RUN_TIMEOUT_S, check=False)
     assert wrong.returncode == 1
-    assert "expected P8" in wrong.stderr
+    assert "expected the one answer 'P8'" in wrong.stderr
 
 
 @pytest.mark.usefixtures("images")

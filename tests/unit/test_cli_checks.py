@@ -4,17 +4,16 @@ import pytest
 from deixis_cli.checks import Listening, findings
 from deixis_cli.system import StageProcess, System
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Health, InputHealth, OutputHealth, Poi, State
+from deixis_schemas.messages import CameraInfo, Health, InputHealth, OutputHealth, State
 
 CLEAN = Listening(frozenset(topics.STAGES), edits_reach_fusion=True)
-POI = Poi(poi_id="door", position_m=(1, 2, 0))
 
 
 def health(stage, **changes):
     outputs = [
         OutputHealth(key=f"deixis/r1/{topic.path}", published=300, rate_hz=30)
         for topic in topics.TOPICS
-        if topic.path.split("/")[0] == stage
+        if topic.stage == stage
     ]
     content = {"stamp_ns": 1, "stage": stage, "instance": "a", "count": 9, "state": "ok", "pid": 1, "host": "edge"}
     return Health(**{**content, "uptime_s": 60, "cpu_s": 6, "rss_mb": 50, "outputs": outputs, **changes})
@@ -30,8 +29,9 @@ def camera(**changes):
     )
 
 
-def state(pois=(POI,), **changes):
-    return State(stamp_ns=1, stage="fusion", instance="a", robot="r1", sources=[], pois=list(pois), persons=[], **changes)
+def state(pois=3, **changes):
+    content = {"stamp_ns": 1, "stage": "fusion", "instance": "a", "robot": "r1", "sources": [], "pois": [], "persons": []}
+    return State(**{**content, "pois_total": pois, **changes})
 
 
 def system(**changes):
@@ -58,7 +58,7 @@ def test_a_healthy_system_has_nothing_wrong():
         ({"processes": {"camera": [process("camera", clock_ahead_s=-7.0)]}}, "the clock of host edge is 7.0 s behind ours"),
         ({"camera": camera(state="retrying", reason="it is not there")}, "camera: retrying: it is not there"),
         ({"camera": camera(rate_hz=60)}, "tracker/tracks: 30.0/s, expected 60/s"),
-        ({"state": state(pois=())}, "there are no points of interest"),
+        ({"state": state(pois=0)}, "there are no points of interest"),
         ({"state": None}, "fusion/state: a get is not answered"),
     ],
 )  # fmt: skip

@@ -1,7 +1,11 @@
 """Subcommands come from entry points, so that adding one edits no list."""
 
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
+import deixis_cli
+import deixis_runtime
 import pytest
 from deixis_cli import main as command_line
 
@@ -55,12 +59,13 @@ def test_the_robot_has_to_be_named(command, capsys):
 
 
 @pytest.mark.parametrize(
-    "argv", [["remove", "a/b"], ["remove", "*"], ["add", "a b", "0", "0", "0"], ["move", "a?x", "0", "0", "0"]]
+    "argv",
+    [["remove", "a/b"], ["remove", "*"], ["add", "a b", "0", "0", "0"], ["move", "a?x", "0", "0", "0"], ["remove", ".."]],
 )
 def test_a_poi_id_that_is_no_part_of_a_key_is_refused(argv, capsys):
     with pytest.raises(SystemExit):
         command_line.main(["poi", *argv, "--robot", "r1"])
-    assert "is not an id" in capsys.readouterr().err
+    assert "is not a name" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -74,3 +79,11 @@ def test_a_poi_id_that_is_no_part_of_a_key_is_refused(argv, capsys):
 def test_a_poi_with_a_bad_field_is_refused_before_anything_is_sent(argv, field, capsys):
     assert command_line.main(["poi", "add", *argv, "--robot", "r1", "--connect", "tcp/127.0.0.1:1"]) == 1
     assert field in capsys.readouterr().err
+
+
+def test_every_command_that_is_advised_exists():
+    packages = [Path(module.__file__).parent for module in (deixis_cli, deixis_runtime)]
+    texts = [path.read_text() for package in packages for path in package.glob("*.py")]
+    advised = {name for text in texts for name in re.findall(r"[`':] ?deixis ([a-z][a-z-]*)", text)}
+    assert {"up", "run", "doctor", "poi"} <= advised
+    assert advised <= COMMANDS

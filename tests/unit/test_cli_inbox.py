@@ -52,7 +52,7 @@ def test_what_breaks_the_contract_is_counted_with_its_cause_and_left_out():
     assert inbox.take_all() == []
     assert inbox.rejected == 3
     assert inbox.rejections["deixis/r1/some/other/key"] == "a key outside the contract"
-    assert "expected 'application/msgpack;Tracks/1'" in inbox.rejections["deixis/r1/tracker/tracks"]
+    assert "expected 'application/msgpack;Tracks/2'" in inbox.rejections["deixis/r1/tracker/tracks"]
 
 
 def test_a_delete_is_taken_without_a_message():

@@ -1,10 +1,12 @@
 """Options that several commands share."""
 
 import argparse
+from types import SimpleNamespace
 
 import pytest
 import yaml
 from deixis_cli.options import CommandError, add_host, add_robot, host_options, quoted, read_site, stage_settings
+from deixis_runtime import host
 from deixis_runtime.host import HostFailed
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,7 +44,7 @@ def test_a_setting_without_stage_name_or_value_is_refused(item):
 
 
 def test_settings_given_by_the_user_come_after_those_of_the_command():
-    given = options("--only", "camera", "--set", "camera.source=1", camera={"source": "0"})
+    given = options("--only", "camera", "--set", "camera.source=1", source={"source": "0"})
     assert given.sets["camera"] == ("source=0", "source=1")
 
 
@@ -68,3 +70,35 @@ def test_a_site_with_settings_of_an_unknown_stage_is_refused_with_file_and_field
         read_site(site)
     with pytest.raises(CommandError, match=r"nowhere\.yaml: No such file"):
         read_site(tmp_path / "nowhere.yaml")
+
+
+def installed(monkeypatch, *names):
+    entries = [SimpleNamespace(name=name) for name in names]
+    monkeypatch.setattr(host, "entry_points", lambda **_: entries)
+
+
+def test_a_stage_that_is_installed_is_started_and_may_have_settings_with_no_list_edited(tmp_path, monkeypatch):
+    installed(monkeypatch, "gaze", "fusion", "tracker", "headpose", "camera", "gesture")
+    given = options("--set", "gaze.x=1")
+    assert given.stages == ("camera", "tracker", "headpose", "gesture", "fusion", "gaze")
+    assert given.sets["gaze"] == ("x=1",)
+    assert options("--only", "gaze,camera").stages == ("camera", "gaze")
+    assert "gaze" not in options("--except", "gaze").stages
+    site = tmp_path / "site.yaml"
+    site.write_text("settings: {gaze: {x: 1}}")
+    assert read_site(site).settings == {"gaze": {"x": 1}}
+
+
+def test_what_is_not_installed_is_not_started_and_said(tmp_path, monkeypatch, caplog):
+    installed(monkeypatch, "camera")
+    assert options().stages == ("camera",)
+    assert "not installed here and so not started: fusion, gesture, headpose, tracker" in caplog.text
+    assert options("--except", "fusion").stages == ("camera",)
+    with pytest.raises(HostFailed, match="'fusion' is not installed here"):
+        options("--only", "fusion")
+    site = tmp_path / "site.yaml"
+    site.write_text("settings: {fusion: {rules: paper}}")  # one site file serves robot and edge
+    read_site(site)
+    site.write_text("settings: {gaze: {x: 1}}")
+    with pytest.raises(CommandError, match=r"settings\.gaze: there is no such stage \(camera, tracker"):
+        read_site(site)

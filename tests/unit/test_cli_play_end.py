@@ -9,9 +9,8 @@ ALL = ("camera", "tracker", "headpose", "gesture", "fusion")
 
 
 def camera(state, last_seq=-1, reason=""):
-    return CameraInfo(
-        stamp_ns=1, stage="camera", instance="c", state=state, reason=reason, source="clip.mp4", last_seq=last_seq
-    )
+    content = {"stamp_ns": 1, "stage": "camera", "instance": "c", "source": "clip.mp4", "run": FRAME.run}
+    return CameraInfo(**content, state=state, reason=reason, last_seq=last_seq)
 
 
 def frame(seq):
@@ -19,7 +18,7 @@ def frame(seq):
 
 
 def tracks(seq):
-    return Tracks(stamp_ns=1, stage="tracker", instance="t", seq=seq, width=2, height=2)
+    return Tracks(stamp_ns=1, stage="tracker", instance="t", run=FRAME.run, seq=seq, width=2, height=2)
 
 
 def test_a_run_is_over_when_each_stage_has_answered_the_last_frame():

@@ -45,7 +45,7 @@ class CameraStage:
         self._frames_since_info = 0
         self._stamp_ns = LOCKSTEP_EPOCH_NS
         self._picture_s = 0.0
-        node.serve_get(topics.CAMERA_INFO.key(node.robot), self._answer)
+        node.serve_get(topics.CAMERA_INFO, self._answer)
 
     def run(self) -> None:
         """Until shutdown."""

@@ -54,8 +54,8 @@ class FusionService:
         self._poi_edits = node.subscribe_edits(topics.POI.key(node.robot, id="**"))
         self._belief = node.publish(topics.BELIEF)
         self._target = node.publish(topics.TARGET)
-        node.serve_get(topics.POI.key(node.robot, id="**"), self._answer_poi)
-        node.serve_get(topics.STATE.key(node.robot), self._answer_state)
+        node.serve_get(topics.POI, self._answer_poi, id="**")
+        node.serve_get(topics.STATE, self._answer_state)
         self._place_robot()
         self._fusion.set_pois(registry.pois())
 

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from types import FrameType
 from typing import Any, Self
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+POLL_S = 0.1
 
 
 class Interrupts:
-    """While entered, SIGINT and SIGTERM only set `signal`. Elsewhere than in the main thread it changes nothing."""
+    """While entered, SIGINT and SIGTERM only set `signal`. Elsewhere than in the main thread it changes nothing.
+
+    A handler runs between two instructions of whatever the main thread does: `threading.Event.set` in it deadlocks where that
+    was waiting for the same event and held its lock. So there is a plain attribute, and waits that look at it.
+    """
 
     def __init__(self) -> None:
         self.signal: int | None = None
-        self._event = threading.Event()
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -33,12 +38,10 @@ class Interrupts:
 
     def wait(self, timeout_s: float) -> bool:
         """Wait at most `timeout_s`; whether somebody asked us to stop."""
-        return self._event.wait(timeout_s)
-
-    def exit_status(self) -> int:
-        """What a shell expects of a process that was interrupted: 128 and the signal's number; 0 if it was not."""
-        return 128 + self.signal if self.signal is not None else 0
+        deadline_s = time.monotonic() + timeout_s
+        while not self.requested() and (left_s := deadline_s - time.monotonic()) > 0:
+            time.sleep(min(left_s, POLL_S))
+        return self.requested()
 
     def _note(self, number: int, _frame: FrameType | None) -> None:
         self.signal = number
-        self._event.set()

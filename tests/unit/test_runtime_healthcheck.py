@@ -1,0 +1,54 @@
+"""What the container's health check finds wrong."""
+
+import socket
+
+import pytest
+from deixis_runtime.healthcheck import health_problem, main, router_problem
+from deixis_schemas import codec
+from deixis_schemas.messages import Health
+from deixis_schemas.samples import SAMPLES
+
+HEALTH = next(message for message in SAMPLES if isinstance(message, Health))
+
+
+def problem(**changes):
+    health = HEALTH.model_copy(update=changes)
+    return health_problem(codec.encode(health), codec.encoding_of(Health))
+
+
+def test_a_router_that_listens_is_well(tmp_path):
+    path = str(tmp_path / "router.sock")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(path)
+        listening.listen()
+        assert router_problem(path) == ""
+    assert "Connection refused" in router_problem(path)
+
+
+def test_a_router_that_is_not_there_is_named_with_its_socket(tmp_path, capsys):
+    path = str(tmp_path / "router.sock")
+    assert main(["router", "--socket", path]) == 1
+    assert f"router: {path}: No such file" in capsys.readouterr().err
+
+
+def test_a_stage_is_well_unless_it_says_that_it_has_failed():
+    assert problem(state="ok") == ""
+    assert problem(state="degraded", reason="the camera is silent") == ""
+    assert problem(state="failed", reason="no such device") == f"{HEALTH.stage}: no such device"
+
+
+def test_an_answer_that_breaks_the_contract_is_an_error():
+    with pytest.raises(codec.CodecError):
+        health_problem(b"garbage", codec.encoding_of(Health))
+
+
+def test_a_stage_without_a_router_is_said(tmp_path, capsys):
+    assert main(["tracker", "--robot", "r1", "--socket", str(tmp_path / "router.sock")]) == 1
+    assert "tracker: no Zenoh router answers" in capsys.readouterr().err
+
+
+def test_the_robot_has_to_be_known(monkeypatch, capsys):
+    monkeypatch.delenv("DEIXIS_ROBOT", raising=False)
+    with pytest.raises(SystemExit):
+        main(["tracker"])
+    assert "DEIXIS_ROBOT" in capsys.readouterr().err

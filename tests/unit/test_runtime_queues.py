@@ -1,0 +1,215 @@
+"""Edits and gets that wait for the loop are bounded, and what is lost is counted; steps are those of the last second."""
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+from deixis_runtime import inputs, queries
+from deixis_runtime.heartbeat import StepTimes
+from deixis_runtime.inputs import Subscription
+from deixis_runtime.queries import EditQueue, QueryQueue
+from deixis_schemas import codec, topics
+from deixis_schemas.messages import Poi, State
+from deixis_schemas.samples import FRAME
+from zenoh import Parameters, SampleKind, ZBytes
+
+
+class Log:
+    """Takes warnings."""
+
+    def __init__(self):
+        self.said = []
+
+    def __call__(self, _kind, text):
+        self.said.append(text)
+
+
+@pytest.fixture
+def log():
+    return Log()
+
+
+def no_wake():
+    """Nobody waits."""
+
+
+def put(number, size=10):
+    payload = type("Payload", (), {"to_bytes": lambda _: b"%d" % number, "__len__": lambda _: size})()
+    return SimpleNamespace(key_expr=f"deixis/r1/fusion/poi/p{number}", kind=SampleKind.PUT, payload=payload, encoding="x")
+
+
+def test_a_burst_of_edits_is_kept_whole_and_in_its_order(log):
+    queue = EditQueue(no_wake, log)
+    for number in range(5000):
+        queue.store(put(number))
+    assert [int(edit.payload) for edit in queue.take_all()] == list(range(5000))
+    assert (queue.lost, log.said) == (0, [])
+
+
+def test_past_the_bound_the_newest_edits_are_lost_counted_and_said_once(log, monkeypatch):
+    monkeypatch.setattr(queries, "MAX_EDITS", 100)
+    queue = EditQueue(no_wake, log)
+    for number in range(103):
+        queue.store(put(number))
+    assert [int(edit.payload) for edit in queue.take_all()] == list(range(100))
+    assert queue.lost == 3
+    queue.store(put(7))
+    assert len(queue.take_all()) == 1, "there is room again"
+    assert len(log.said) == 1
+    assert "3 edits lost" in log.said[0]
+
+
+def test_edits_are_bounded_by_their_bytes_too(log):
+    queue = EditQueue(no_wake, log)
+    for number in range(40):
+        queue.store(put(number, size=1 << 20))
+    assert len(queue.take_all()) == 32
+    assert queue.lost == 8
+    queue.store(put(1, size=1 << 20))
+    assert len(queue.take_all()) == 1
+
+
+class Asked:
+    """A get, and what is replied to it."""
+
+    def __init__(self, parameters=""):
+        self.key_expr, self.payload, self.encoding = "deixis/r1/fusion/state", None, None
+        self.parameters = Parameters(parameters)
+        self.replies, self.errors, self.dropped = [], [], False
+
+    def reply(self, key, payload, encoding):
+        self.replies.append((key, payload, encoding))
+
+    def reply_err(self, payload, **_):
+        self.errors.append(payload.decode())
+
+    def drop(self):
+        self.dropped = True
+
+
+def answered(topic, message, log, parameters=""):
+    queue = QueryQueue(topic, lambda _: [("deixis/r1/fusion/state", message)], no_wake, log)
+    asked = Asked(parameters)
+    queue.store(asked)
+    queue.answer_all()
+    assert asked.dropped
+    return asked
+
+
+@pytest.mark.parametrize("parameters", ["", "format=json"])
+def test_a_reply_that_is_too_large_becomes_an_error_that_says_how_to_ask(log, parameters):
+    pois = [Poi(poi_id=f"p{n}", name="x" * 2000, position_m=(0, 0, 0), tags=["y" * 64] * 32) for n in range(1024)]
+    state = State(stamp_ns=1, stage="fusion", instance="a", robot="r1", sources=[], pois=pois, persons=[])
+    assert len(codec.encode(state)) > topics.STATE.max_bytes
+    asked = answered(topics.STATE, state, log, parameters)
+    assert asked.replies == []
+    (error,) = asked.errors
+    assert str(topics.STATE.max_bytes) in error
+    assert "?top=N or ?poi=ID" in error
+    assert "deixis/r1/fusion/state" in log.said[0]
+
+
+def test_a_reply_of_more_than_a_mebibyte_is_sent_where_the_topic_allows_it(log):
+    pois = [Poi(poi_id=f"p{n}", name="x" * 2000, position_m=(0, 0, 0)) for n in range(1000)]
+    state = State(stamp_ns=1, stage="fusion", instance="a", robot="r1", sources=[], pois=pois, persons=[])
+    asked = answered(topics.STATE, state, log)
+    assert len(asked.replies[0][1]) > 1 << 20
+    assert asked.errors == []
+
+
+def test_gets_past_the_bound_are_counted(log):
+    queue = QueryQueue(topics.STATE, lambda _: [], no_wake, log)
+    for _ in range(queries.MAX_WAITING + 2):
+        queue.store(Asked())
+    assert queue.lost == 2
+
+
+def frame_sample(seq, stamp_ns):
+    payload = codec.encode(FRAME.model_copy(update={"seq": seq, "stamp_ns": stamp_ns}))
+    key = topics.FRAME.key("r1")
+    return SimpleNamespace(
+        key_expr=key, kind=SampleKind.PUT, payload=ZBytes(payload), encoding=codec.encoding_of(topics.FRAME.type)
+    )
+
+
+class Clock:
+    """Our monotonic clock, set by hand."""
+
+    def __init__(self):
+        self.now_s = 100.0
+
+    def monotonic(self):
+        return self.now_s
+
+    def monotonic_ns(self):
+        return round(self.now_s * 1e9)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(inputs, "time", clock)
+    return clock
+
+
+def frames_and_link(log, **options):
+    """A subscription, and a function that delivers frame `seq`, captured `after_s` seconds after the first, at once."""
+    frames = Subscription(topics.FRAME, "deixis/r1/camera/frame", 8, no_wake, log, **options)
+    return frames, lambda seq, after_s: frames.store(frame_sample(seq, 10**18 + round(after_s * 1e9)))
+
+
+def test_old_messages_are_dropped_counted_and_said(log, clock):
+    frames, deliver = frames_and_link(log)
+    deliver(0, 0.0)
+    assert len(frames.take_all()) == 1
+    clock.now_s += 5.0  # the link is cut, and gives all out when it is mended
+    for seq in range(1, 6):
+        deliver(seq, float(seq))
+    assert [frame.seq for frame in frames.take_all()] == [4, 5]
+    assert (frames.received, frames.used, frames.too_old) == (6, 3, 3)
+    assert frames.health().too_old == 3
+    assert log.said == ["deixis/r1/camera/frame: dropped, 4.0 s old; the limit is 1 s"]
+
+
+def test_that_all_of_a_key_is_too_old_is_told_and_taken_back(log, clock):
+    frames, deliver = frames_and_link(log)
+    deliver(0, 0.0)
+    frames.take()
+    assert not frames.all_too_old()
+    clock.now_s += 5.0
+    deliver(1, 3.0)
+    assert frames.take() is None
+    assert frames.age_s() == 5.0, "what is too old is not accepted"
+    assert frames.all_too_old()
+    assert not frames.all_too_old(), "nothing came since"
+    deliver(2, 3.0)
+    deliver(3, 5.0)
+    assert frames.take().seq == 3
+    assert not frames.all_too_old(), "one was used"
+
+
+def test_in_lockstep_no_age_is_judged(log, clock):
+    frames, deliver = frames_and_link(log, lockstep=True)
+    for seq in range(3):
+        deliver(seq, 0.0)
+        clock.now_s += 60.0
+    assert len(frames.take_all()) == 3
+
+
+def test_step_times_are_those_of_the_last_second():
+    steps = StepTimes()
+    for turn in range(300):
+        steps.add(0.5 if turn < 200 else 0.001, turn * 0.01)
+    assert max(steps.last_second_ms(3.0)) == pytest.approx(1.0)
+    assert len(steps.last_second_ms(3.0)) <= 101
+    assert steps.last_second_ms(5.0) == []
+
+
+def test_queues_may_be_filled_while_they_are_emptied(log):
+    queue, heard = EditQueue(no_wake, log), []
+    writer = threading.Thread(target=lambda: [queue.store(put(number)) for number in range(3000)])
+    writer.start()
+    while writer.is_alive():
+        heard += queue.take_all()
+    heard += queue.take_all()
+    assert [int(edit.payload) for edit in heard] == list(range(3000))
