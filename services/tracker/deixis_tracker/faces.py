@@ -20,7 +20,7 @@ from deixis_tracker.views import Box, Image, around
 FRONTAL = "haarcascade_frontalface_alt2"
 WINDOW_PX = 20  # of that cascade
 LOOKED_AT_PX = 32  # a place that is looked at is scaled to this width of a face
-MEASURED_AT_PX = (56.0, 62.0, 68.0)
+FIRST_AT_PX, MEASURED_AT_PX = 50.0, (56.0, 62.0, 68.0)
 MEASURED_BOX_M, MEASURED_BOX_DROP_M = 0.197, 0.006  # width of the box so measured, and how far below the head's centre it is
 
 
@@ -62,26 +62,27 @@ def look(grey: Image, x: float, y: float, width: float) -> Box | None:
 
 
 def measure(frame: Image, seen: Box) -> FrontalFace | None:
-    """What `look` has seen, measured; both in pixels of the (H, W, 3) frame. None where it shows at no other size."""
-    x, y = seen.centre
-    found: list[_Found] = []
-    for at in MEASURED_AT_PX:
-        found += _detect(frame, x, y, round(1.7 * seen.w), at / seen.w, round(0.8 * at), round(1.25 * at))
-    near = [f for f in found if np.hypot(f.x - x, f.y - y) < 0.2 * seen.w]
-    if not near:
+    """What `look` has seen, measured; both in pixels of the (H, W, 3) frame. None where it does not show at other sizes."""
+    first = _find(frame, _Found(*seen.centre, seen.w), FIRST_AT_PX)
+    if not first:
         return None
-    box_x, box_y, box_width = (float(v) for v in np.mean(near, axis=0))
+    face = min(first, key=lambda f: np.hypot(f.x - seen.centre[0], f.y - seen.centre[1]))
+    found = [again for at in MEASURED_AT_PX for again in _find(frame, face, at)]
+    box_x, box_y, box_width = (float(v) for v in np.mean(found or [face], axis=0))
     head_y = box_y - MEASURED_BOX_DROP_M / MEASURED_BOX_M * box_width
     return FrontalFace(centre_px=(box_x, head_y), width_px=FACE_WIDTH_M / MEASURED_BOX_M * box_width)
 
 
-def _detect(frame: Image, x: float, y: float, side: int, scale: float, least: int, most: int) -> list[_Found]:
-    """Frontal faces in a square about (x, y), scaled by `scale`, in which their boxes are `least` to `most` pixels wide."""
-    left, top = max(0, round(x - side / 2)), max(0, round(y - side / 2))
+def _find(frame: Image, face: _Found, at_px: float) -> list[_Found]:
+    """The face again, with its box scaled to `at_px`; none where it is not seen so."""
+    side, scale = round(1.7 * face.width), at_px / face.width
+    left, top = max(0, round(face.x - side / 2)), max(0, round(face.y - side / 2))
     cut = frame[top : top + side, left : left + side]
+    least, most = round(0.8 * at_px), round(1.25 * at_px)
     if min(cut.shape[:2]) * scale < least:
         return []
     grey = cv2.cvtColor(cut, cv2.COLOR_BGR2GRAY)
     small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     boxes = load_cascade().detectMultiScale(small, 1.05, 3, minSize=(least, least), maxSize=(most, most))
-    return [_Found(left + (x + w / 2) / scale - 0.5, top + (y + h / 2) / scale - 0.5, w / scale) for x, y, w, h in boxes]
+    found = [_Found(left + (x + w / 2) / scale - 0.5, top + (y + h / 2) / scale - 0.5, w / scale) for x, y, w, h in boxes]
+    return [again for again in found if np.hypot(again.x - face.x, again.y - face.y) < 0.2 * face.width]

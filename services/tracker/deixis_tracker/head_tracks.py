@@ -56,8 +56,9 @@ class HeadTracks:
         self.left_out = 0
         for person in self.persons:
             self._follow(person, views, skin, step)
-            person.skin_centre = self._centre_of_skin(person, views.skin)
         self._drop_lost(skin, step)
+        for person in self.persons:
+            person.skin_centre = self._centre_of_skin(person, views.skin)
         self._find_faces(views, room, skin, step)
         self._find_walkers(views, room, people, step)
         self._measure_faces(views, step)
