@@ -28,9 +28,9 @@ LEAST_COARSE_HEAD_PX = 32  # narrower heads are followed at full resolution
 HEAD_PER_BOX = 0.96  # width of the head, of that of the Haar box that `faces.look` finds on it
 BOX_BELOW_HEAD = 0.04  # the centre of that box lies so far below the head's, head widths
 LOOK_S, STAGGERED_S = 1 / 6, 1 / 30  # persons are looked at in different frames
-MEASURE_S = 0.5  # measuring a face takes as long as all else in a frame
+MEASURE_S = 1.0  # measuring a face takes as long as all else in a frame
 AWAY_S = 0.3
-# A face that is new, or was away, is measured in each frame for so long or so often: pose estimation starts with it.
+# A face that is new, or was turned away or covered, is measured in each frame: pose estimation starts with it.
 FRESH_S, FRESH_SIGHTINGS = 0.5, 5
 LEARN_COLOURS_S = 1 / 15
 SKIN_FROM_EVERY = 3  # sightings of the face
@@ -79,11 +79,29 @@ class HeadTracks:
         else:
             person.motion.damp(step.kept(UNSEEN_SPEED_KEPT))
         if step.periods(LOOK_S, person.person_id * STAGGERED_S):
-            _look_again(person, views, skin, step)
+            self._look_again(person, views, skin, covered, step)
         lessons = step.periods(LEARN_COLOURS_S)
         if lessons and person.observed and not covered:
             place = scale * person.x, scale * person.y, scale * person.width
             person.colours.learn(picture, *place, repeated(0.03, lessons))
+
+    def _look_again(self, person: Person, views: Views, skin: SkinModel, covered: bool, step: Step) -> None:
+        """Correct a head by its frontal face, where that is to be seen. `covered`: a hand is before it."""
+        seen = _look(person, views)
+        if seen is None:
+            return
+        if not covered:
+            if step.now_ns - person.face_ns > AWAY_S * 1e9:
+                person.fresh_ns, person.measured = step.now_ns, 0
+            person.face_ns = step.now_ns
+        person.sightings += 1
+        person.seen_ns = step.now_ns
+        person.observed = True
+        person.width += max(0.06, 1 / person.sightings) * (HEAD_PER_BOX * seen.w - person.width)
+        x, y = seen.centre
+        person.motion.correct(x, y - BOX_BELOW_HEAD * person.width, 0.08 * person.width)
+        if person.sightings % SKIN_FROM_EVERY == 1:
+            _learn_skin(person, views.full, skin)
 
     def _centre_of_skin(self, person: Person, skin: Image) -> tuple[float, float] | None:
         """Centroid of the skin on the head: where the face is on a head that is turned."""
@@ -173,24 +191,8 @@ class HeadTracks:
 
 
 def _look(person: Person, views: Views) -> Box | None:
+    """The Haar box of a person's face, where it is seen from the front."""
     return look(views.grey, person.x, person.y + BOX_BELOW_HEAD * person.width, person.width)
-
-
-def _look_again(person: Person, views: Views, skin: SkinModel, step: Step) -> None:
-    """Correct a head by its frontal face, where that is to be seen."""
-    seen = _look(person, views)
-    if seen is None:
-        return
-    if step.now_ns - person.face_ns > AWAY_S * 1e9:
-        person.fresh_ns, person.measured = step.now_ns, 0
-    person.sightings += 1
-    person.seen_ns = person.face_ns = step.now_ns
-    person.observed = True
-    person.width += max(0.06, 1 / person.sightings) * (HEAD_PER_BOX * seen.w - person.width)
-    x, y = seen.centre
-    person.motion.correct(x, y - BOX_BELOW_HEAD * person.width, 0.08 * person.width)
-    if person.sightings % SKIN_FROM_EVERY == 1:
-        _learn_skin(person, views.full, skin)
 
 
 def _learn_skin(person: Person, work: Image, skin: SkinModel) -> None:

@@ -56,7 +56,7 @@ class Person:
     width: float
     colours: HeadColours
     seen_ns: int
-    face_ns: int  # when its face was seen from the front last
+    face_ns: int  # when its face was seen from the front and uncovered last
     fresh_ns: int  # since when it is to be seen there, or known
     support: float = 1.0
     observed: bool = True
