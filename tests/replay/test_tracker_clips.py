@@ -48,6 +48,16 @@ def test_face_and_pointing_hand_of_a_clip_are_found(rendered, name, side):
     assert hands >= 0.9 * raised
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_somebody_who_walks_past_in_profile_is_found_as_soon_at_a_lower_frame_rate(rendered, every):
+    def found_at(every):
+        tracker = Tracker(TrackerConfig())
+        frames = frames_of(rendered / "a11_walk.mp4", count=60)
+        return next(k for k, image in frames if k % every == 0 and tracker.update(image, 1, k * PERIOD_NS))
+
+    assert found_at(every) - found_at(1) <= every
+
+
 def test_an_empty_room_with_flickering_light_has_nobody_in_it(rendered):
     tracker = Tracker(TrackerConfig())
     assert not any(

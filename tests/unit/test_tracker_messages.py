@@ -14,7 +14,7 @@ def test_tracks_of_the_example_are_in_pixels_of_the_given_frame_and_fit_their_me
     for k in range(8):
         ok, image = capture.read()
         assert ok
-        tracks = tracker.update(np.asarray(cv2.resize(image, None, fx=scale, fy=scale), np.uint8), k * 33_000_000)
+        tracks = tracker.update(np.asarray(cv2.resize(image, None, fx=scale, fy=scale), np.uint8), 1, k * 33_000_000)
     message = Tracks(
         run=1,
         seq=7,

@@ -1,6 +1,5 @@
 import numpy as np
-from deixis_tracker.colour_table import look_up
-from deixis_tracker.skin import SkinModel, hysteresis
+from deixis_tracker.skin import SkinModel, hysteresis, look_up
 
 
 def patch(*bgr):

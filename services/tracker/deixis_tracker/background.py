@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from deixis_tracker.boxes import Box
+from deixis_tracker.seconds import Step, repeated
+from deixis_tracker.views import Box, Image, Mask
 
-Image = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
-
-UPDATE_EVERY = 3  # frames
+UPDATE_S = 0.1
+STEADY_RATE, CHANGED_RATE = 0.1, 0.02  # of learning, per update
+OLD_ROOM_KEPT = (1 - 0.35) ** 30  # of the room before a change of the light, per second
+LIGHT_SETTLES_S = 0.35
 GRID = 6  # the gain is fitted on every 6th pixel of the coarse picture
 UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, changed
 SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07
 SHADOW_DARKEST = 0.35
+MOTION_THRESHOLD = 14
+MOTION_FADES_PER_S = 480.0  # of 255
 
 
 class Background:
@@ -33,9 +35,9 @@ class Background:
         self._mean = image.astype(np.float32)
         self._shown = image.copy()
         self._threshold = threshold
-        self._frames = 0
         self.unknown: Mask = np.zeros(image.shape[:2], np.uint8)
-        self.unstable = 0  # frames until a change of light counts as learned
+        self.unstable = False  # the light changed just now: what differs from the room is no person
+        self._settled_ns = 0
         self._expected = self._shown
 
     def mark_unknown(self, box: Box) -> None:
@@ -71,20 +73,20 @@ class Background:
         result[rows[shadow], columns[shadow]] = 0
         return result
 
-    def update(self, image: Image, changed: Mask, frozen: Mask) -> None:
+    def update(self, image: Image, changed: Mask, frozen: Mask, step: Step) -> None:
         """Learn the room where no person is: steady places quickly, changed ones slowly, all at once when the light changed."""
-        self._frames += 1
         room = frozen == 0
         room_size = int(np.count_nonzero(room[::2, ::2]))
         moved = int(np.count_nonzero(changed[::2, ::2] * room[::2, ::2]))
         if room_size and moved > UPHEAVAL * room_size:
-            self.unstable = 12
-        self.unstable = max(0, self.unstable - 1)
+            self._settled_ns = step.now_ns + round(LIGHT_SETTLES_S * 1e9)
+        self.unstable = step.now_ns < self._settled_ns
+        updates = step.periods(UPDATE_S)
         if self.unstable:
-            self._learn(image, np.asarray(room, np.uint8), 0.35)
-        elif self._frames % UPDATE_EVERY == 0:
-            self._learn(image, np.asarray(room & (changed == 0), np.uint8), 0.1)
-            self._learn(image, np.asarray(room & (changed != 0), np.uint8), 0.02)
+            self._learn(image, np.asarray(room, np.uint8), step.learned(OLD_ROOM_KEPT))
+        elif updates:
+            self._learn(image, np.asarray(room & (changed == 0), np.uint8), repeated(STEADY_RATE, updates))
+            self._learn(image, np.asarray(room & (changed != 0), np.uint8), repeated(CHANGED_RATE, updates))
 
     def _learn(self, image: Image, where: Mask, rate: float) -> None:
         cv2.accumulateWeighted(image, self._mean, rate, mask=where)
@@ -105,3 +107,24 @@ class Background:
         levels = np.arange(256, dtype=np.float32)[:, None] * np.array(gains, np.float32)
         table = np.clip(levels, 0, 255).astype(np.uint8)[None]
         return np.asarray(cv2.LUT(self._shown, table), np.uint8)
+
+
+class MotionHistory:
+    """Where something moved lately: 255 now, fading. Half the size of the coarse picture."""
+
+    def __init__(self, image: Image) -> None:
+        self._last = self._small(image)
+        self.history: Mask = np.zeros_like(self._last)
+
+    def update(self, image: Image, step: Step) -> None:
+        """Take in the next picture."""
+        small = self._small(image)
+        moved = cv2.threshold(cv2.absdiff(small, self._last), MOTION_THRESHOLD, 255, cv2.THRESH_BINARY)[1]
+        fade = np.full_like(self.history, min(255, round(MOTION_FADES_PER_S * step.passed_s)))
+        self.history = np.asarray(cv2.max(cv2.subtract(self.history, fade), moved), np.uint8)
+        self._last = small
+
+    @staticmethod
+    def _small(image: Image) -> Image:
+        size = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
+        return np.asarray(cv2.cvtColor(cv2.resize(image, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY), np.uint8)

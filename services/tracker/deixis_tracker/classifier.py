@@ -1,6 +1,6 @@
 """Incremental probabilistic classifier of hand blobs (after Pateraki et al. 2011, sec. 4, [3]).
 
-Each frame adds the log likelihoods of what was measured (place relative to the face, size, foreground evidence, speed) to
+Each frame adds the log likelihoods of what was measured (place relative to the head, size, foreground evidence, speed) to
 the belief over left hand, right hand and unknown. Frames in a row say nearly the same thing, so each counts only for a
 fraction, and old evidence fades. Left and right are the person's own: the left hand hangs at the image's right of the face.
 A hand hanging at its side says much about its side, a raised one little, for arms cross the body: so the label of an arm
@@ -18,7 +18,7 @@ from deixis_schemas.messages import KindProbabilities
 HandKind = Literal["left_hand", "right_hand", "unknown"]
 KINDS: tuple[HandKind, ...] = ("left_hand", "right_hand", "unknown")
 
-HANGING_BELOW = 2.0  # face widths below the face
+HANGING_BELOW = 2.0  # head widths below the head
 RATE_PER_S = 8.0  # independent observations a second
 MEMORY = 7.0  # most log odds that are kept
 RAISED_SAYS = 2.0  # most log odds that the place of a raised hand gives to its side
@@ -26,7 +26,7 @@ RAISED = 1.2  # what is skin-coloured and stands out from the room high up is li
 
 
 class Features(NamedTuple):
-    """What is measured of a blob in one frame; lengths in face widths, `dx` and `dy` from the face, image right and down."""
+    """What is measured of a blob in one frame; lengths in head widths, `dx` and `dy` from the head, image right and down."""
 
     dx: float
     dy: float

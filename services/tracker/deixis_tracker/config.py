@@ -7,7 +7,7 @@ from pydantic import Field
 
 
 class TrackerConfig(StageConfig):
-    """How frames become face and hand tracks. Lengths are in face widths, as published, unless the name says otherwise."""
+    """How frames become face and hand tracks. Lengths are in head widths (`persons.py`) unless the name says otherwise."""
 
     work_width_px: int = Field(
         default=640,
@@ -37,7 +37,7 @@ class TrackerConfig(StageConfig):
     change_threshold: int = Field(
         default=20, ge=2, le=200, description="Difference from the background that counts as change, grey levels."
     )
-    min_hand_area: float = Field(default=0.08, gt=0, le=5, description="Smallest hand, face widths squared.")
+    min_hand_area: float = Field(default=0.08, gt=0, le=5, description="Smallest hand, head widths squared.")
     hand_length: float = Field(
         default=1.0, gt=0.2, le=3, description="Length of a hand, by which it is cut from a bare forearm."
     )

@@ -1,6 +1,6 @@
 """Cuts the hand from a blob of hand and bare forearm.
 
-With short sleeves the skin blob is the whole arm. The hand is its far end: about one face width along the blob from the
+With short sleeves the skin blob is the whole arm. The hand is its far end: about one head width along the blob from the
 tip, where the tip is the point farthest along the blob (geodesically, for elbows are bent) from where the arm comes from,
 the shoulder.
 """
@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Mask = NDArray[np.uint8]
+from deixis_tracker.views import Mask
 
 CELLS_PER_WIDTH = 12  # resolution of the geodesic distances
-NEAR_SHOULDER = 1.2  # face widths: a blob that starts so near the shoulder starts with the upper arm
+NEAR_SHOULDER = 1.2  # head widths: a blob that starts so near the shoulder starts with the upper arm
 SQUARE, CROSS = np.ones((3, 3), np.uint8), np.asarray(cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)), np.uint8)
 
 
@@ -55,35 +55,35 @@ def cut_hand(
     x0: int,
     y0: int,
     shoulder: tuple[float, float],
-    face_width_px: float,
+    head_width_px: float,
     length: float,
     expected: tuple[float, float] | None,
 ) -> Hand:
     """The hand at the far end of a blob.
 
     `mask` (0 or 1) is a window at (x0, y0) that holds one blob; `shoulder` is where the arm starts, `length` that of a hand in
-    face widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm
+    head widths, `expected` the predicted centroid where the hand is already tracked: it overrules the shoulder, for a forearm
     held up in front of the shoulder has its hand at the near end.
     """
-    if math.hypot(*mask.shape) <= length * face_width_px:
+    if math.hypot(*mask.shape) <= length * head_width_px:
         return _whole(mask, x0, y0, shoulder)
-    factor = min(1.0, CELLS_PER_WIDTH / face_width_px)
+    factor = min(1.0, CELLS_PER_WIDTH / head_width_px)
     small = mask if factor == 1 else _shrink(mask, factor)
     offset = np.array([x0, y0], float)
     near = _closest(small, (np.array(shoulder) - offset) * factor)
     from_shoulder = geodesic(small, near)
     far = _farthest(from_shoulder)
     tip, whole = far, float(from_shoulder.max())
-    if expected is not None and whole > 1.2 * length * face_width_px * factor:
+    if expected is not None and whole > 1.2 * length * head_width_px * factor:
         target = (np.array(expected) - offset) * factor
-        half = 0.5 * length * face_width_px * factor
+        half = 0.5 * length * head_width_px * factor
         ends = [_toward(np.array(far), np.array(near), half), _toward(np.array(near), np.array(far), half)]
         away = [float(np.hypot(*(end - target))) for end in ends]
-        from_body = float(np.hypot(*(np.array(near) / factor + offset - shoulder))) / face_width_px
+        from_body = float(np.hypot(*(np.array(near) / factor + offset - shoulder))) / head_width_px
         if from_body > NEAR_SHOULDER and away[1] < 0.5 * away[0] and away[1] < half:
             tip = near
     distance = geodesic(small, tip)
-    keep = np.asarray((distance >= 0) & (distance <= length * face_width_px * factor), np.uint8)
+    keep = np.asarray((distance >= 0) & (distance <= length * head_width_px * factor), np.uint8)
     if factor != 1:
         keep = np.asarray(cv2.resize(keep, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
     hand = mask & keep

@@ -14,17 +14,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from deixis_tracker.boxes import around
-from deixis_tracker.colour_table import look_up
+from deixis_tracker.skin import look_up
+from deixis_tracker.views import Image, around
 
-Image = NDArray[np.uint8]
 Map = NDArray[np.float32]
 
-# Published width W: that of a Haar box, 0.182 m (1.12 times chin-to-brow, ear-to-ear truth); the head is W wide and
-# 1.36 W high.
+# The head is W = anatomy.HEAD_WIDTH_M wide and 1.36 W high.
 HALF_WIDTH, HALF_HEIGHT = 0.5, 0.68
 CELLS_PER_WIDTH = 16
-SEARCH = 0.55  # face widths around the prediction
+SEARCH = 0.55  # head widths around the prediction
 BINS = 16
 LEAST_SUPPORT = 0.12
 
@@ -45,7 +43,7 @@ def _grid(half_cells: int, cells_per_width: float) -> tuple[Map, Map]:
 
 
 def ellipse_kernels() -> tuple[Map, Map]:
-    """(inside, around) kernels at CELLS_PER_WIDTH cells per face width, each summing to 1."""
+    """(inside, around) kernels at CELLS_PER_WIDTH cells per head width, each summing to 1."""
     x, y = _grid(CELLS_PER_WIDTH, CELLS_PER_WIDTH)
     radius = np.hypot(x / HALF_WIDTH, y / HALF_HEIGHT)
     inside: Map = np.clip((1.06 - radius) / 0.12, 0, 1).astype(np.float32)
@@ -102,7 +100,7 @@ class HeadFinder:
         self._inside, self._around = ellipse_kernels()
 
     def find(self, image: Image, colours: HeadColours, x: float, y: float, width: float, tightness: float) -> HeadFound:
-        """The head near the prediction (x, y). `tightness`: penalty on leaving it by one face width, in units of support."""
+        """The head near the prediction (x, y). `tightness`: penalty on leaving it by one head width, in units of support."""
         reach = 1 + SEARCH
         scale = CELLS_PER_WIDTH / width
         side = round(2 * reach * CELLS_PER_WIDTH) + 1

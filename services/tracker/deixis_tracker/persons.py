@@ -1,19 +1,26 @@
-"""What the tracker knows of one person: a head and up to a few hands."""
+"""What the tracker knows of one person: a head and up to a few hands.
+
+The unit of length is the head's width: that of its outline from the front, `anatomy.HEAD_WIDTH_M`.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
-from deixis_tracker.boxes import Box, around
+import numpy as np
+from deixis_schemas.messages import FrontalFace
+
 from deixis_tracker.classifier import HandBelief, HandKind
 from deixis_tracker.hands import Hand
 from deixis_tracker.heads import HeadColours
 from deixis_tracker.hypotheses import Points
 from deixis_tracker.kalman import PointFilter
+from deixis_tracker.views import COARSE, Box, Mask, around
 
 MOST_HANDS = 4
 
-# The face box, in published widths around the head's centre: chin to brow lies a little below the middle of the head.
+# Chin and brow, in head widths from the head's centre: they lie a little below the middle of the head.
 FACE_ABOVE, FACE_BELOW = 0.52, 0.66
 
 
@@ -29,7 +36,7 @@ class HandTrack:
     kind: HandKind = "unknown"
     belief: HandBelief = field(default_factory=HandBelief)
     evidence: float = 0.0
-    frames: int = 1
+    watched_s: float = 0.0  # time in which it was seen
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
 
     @property
@@ -41,7 +48,7 @@ class HandTrack:
 
 @dataclass
 class Person:
-    """One tracked person. Positions are pixels of the working picture; `width` is the published face width."""
+    """One tracked person. Positions are pixels of the working picture; `width` is the head's."""
 
     person_id: int
     track_id: int
@@ -49,10 +56,13 @@ class Person:
     width: float
     colours: HeadColours
     seen_ns: int
+    face_ns: int  # when its face was seen from the front and uncovered last
+    fresh_ns: int  # since when it is to be seen there, or known
     support: float = 1.0
     observed: bool = True
-    frontal: bool = True
-    frontal_hits: int = 1
+    sightings: int = 1  # of a frontal face, that corrected the head
+    measured: int = 0  # times since then
+    frontal: FrontalFace | None = None  # as measured in this frame, in its pixels
     skin_centre: tuple[float, float] | None = None
     hands: list[HandTrack] = field(default_factory=list)
 
@@ -66,8 +76,8 @@ class Person:
         """Head centre."""
         return self.motion.y
 
-    def face_box(self) -> Box:
-        """The face, chin to brow, ear to ear; around the head's centre also when the head is turned away."""
+    def head_box(self) -> Box:
+        """Chin to brow, as wide as the head; around the head's centre also when the head is turned away."""
         half = self.width / 2
         return around(self.x, self.y, half, FACE_ABOVE * self.width, half, FACE_BELOW * self.width)
 
@@ -85,3 +95,19 @@ class Person:
         """The shoulder on the side of the picture where `x` is."""
         side = 1.0 if x > self.x else -1.0
         return self.x + 0.9 * side * self.width, self.y + 1.35 * self.width
+
+    def distance(self, x: float, y: float) -> float:
+        """From the head's centre, head widths."""
+        return math.hypot(x - self.x, y - self.y) / self.width
+
+
+def people_mask(persons: list[Person], shape: tuple[int, int]) -> Mask:
+    """255 where people are or may be, at coarse resolution: there the room is not learned."""
+    mask = np.zeros(shape, np.uint8)
+    for person in persons:
+        margin = 0.8 * person.width
+        hands = [around(hand.motion.x, hand.motion.y, margin, margin, margin, margin) for hand in person.hands]
+        for box in (person.body_box(), *hands):
+            rows, columns = box.scaled(COARSE).window(*shape)
+            mask[rows, columns] = 255
+    return mask

@@ -6,34 +6,17 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from deixis_tracker.background import Background
-from deixis_tracker.boxes import around
-from deixis_tracker.coarse import COARSE
+from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.persons import Person
 from deixis_tracker.skin import SkinModel, hysteresis
+from deixis_tracker.views import COARSE, Image, Mask, Views, around
 
-Image = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
-
-MOTION_THRESHOLD = 14
-MOTION_FADE = 16  # of 255 a frame
 MOST_BLOBS = 24
 FACE_RIM, SLIVER = 0.22, 0.6  # a region with that share so near a head is the rim of a turned face
 GHOST, GHOST_EDGE = 0.6, 12.0  # edges of a ghost: share of those remembered, and grey levels these have at least
 EDGE = np.ones((3, 3), np.uint8)
-
-
-class Views(NamedTuple):
-    """One frame: `full` (H, W, 3) and grey at working resolution; `coarse`, P(skin) and what changed at half of it."""
-
-    full: Image
-    grey: Image
-    coarse: Image
-    skin: Image
-    changed: Mask
 
 
 class Blob(NamedTuple):
@@ -47,28 +30,8 @@ class Blob(NamedTuple):
     sure: float  # mean P(skin)
 
 
-class MotionHistory:
-    """Where something moved lately: 255 now, fading. Half the size of the coarse picture."""
-
-    def __init__(self, image: Image) -> None:
-        self._last = self._small(image)
-        self.history: Mask = np.zeros_like(self._last)
-
-    def update(self, image: Image) -> None:
-        """Take in the next picture."""
-        small = self._small(image)
-        moved = cv2.threshold(cv2.absdiff(small, self._last), MOTION_THRESHOLD, 255, cv2.THRESH_BINARY)[1]
-        self.history = np.asarray(cv2.max(cv2.subtract(self.history, np.full_like(self.history, MOTION_FADE)), moved), np.uint8)
-        self._last = small
-
-    @staticmethod
-    def _small(image: Image) -> Image:
-        size = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
-        return np.asarray(cv2.cvtColor(cv2.resize(image, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY), np.uint8)
-
-
 def head_zone(shape: tuple[int, int], persons: list[Person], rim: float) -> Mask:
-    """255 on heads and necks and `rim` face widths around heads, at coarse resolution: skin there is no hand."""
+    """255 on heads and necks and `rim` head widths around heads, at coarse resolution: skin there is no hand."""
     zone = np.zeros(shape, np.uint8)
     for person in persons:
         x, y, w = COARSE * person.x, COARSE * person.y, COARSE * person.width
@@ -108,7 +71,9 @@ def hand_blobs(
             continue
         evidence = _evidence(mask, x, y, foreground, motion)
         sure = cv2.mean(skin[window], mask)[0] / 255
-        blobs.append(_refined(mask, x, y, evidence, sure, views.full, skin_model, config.skin_low))
+        blob = _refined(mask, x, y, evidence, sure, views.full, skin_model, config.skin_low)
+        if blob.area:  # a thin region may be gone at full resolution, and a hand cut from nothing cost all tracks of the frame
+            blobs.append(blob)
     return blobs
 
 

@@ -9,7 +9,7 @@ from deixis_schemas import topics
 from deixis_schemas.messages import Tracks
 
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.tracker import Tracker
+from deixis_tracker.tracker import FrameRefused, Tracker
 
 
 def serve(node: Node, config: TrackerConfig) -> None:
@@ -25,10 +25,14 @@ def serve(node: Node, config: TrackerConfig) -> None:
         with node.step():
             try:
                 tracks = tracker.update(decode_image(frame), frame.run, frame.stamp_ns)
-            except (ImageError, ValueError) as error:
+            except (ImageError, FrameRefused) as error:
                 node.count("frames_refused")
                 node.warn("frame", f"frame {frame.seq} refused: {error}")
                 tracks = []  # fusion still waits for an answer to this frame
+            else:
+                if tracker.left_out:
+                    node.count("persons_left_out", tracker.left_out)
+                    node.warn("persons", f"more people are seen than max_persons: {config.max_persons} are followed")
             out.put(Tracks.derive(frame, node.producer, width=frame.width, height=frame.height, tracks=tracks))
 
 

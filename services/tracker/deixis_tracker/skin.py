@@ -14,12 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from deixis_tracker.colour_table import look_up
 from deixis_tracker.skin_prior import OTHER, SKIN, Gaussian
+from deixis_tracker.views import Image, Mask
 
 Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
 
 BINS = 32
 OFFSET = 6.0  # keeps the ratios of dark pixels, which are mostly noise, near 1
@@ -45,6 +43,21 @@ def gaussian_densities(x: Array, mean: Array, covariance: Array) -> Array:
     distance = ((offset @ inverse) * offset).sum(axis=1)
     norm = np.sqrt((2 * np.pi) ** x.shape[1] * np.linalg.det(covariance))
     return np.asarray(np.exp(-0.5 * distance) / norm, np.float64)
+
+
+def look_up(table: Image, image: Image) -> Image:
+    """`table` (N, N, N) uint8 over B, G, R, N a power of two up to 32, applied to (H, W, 3): (H, W) uint8.
+
+    cv2.calcBackProject cannot do it: the Python binding takes a table of three dimensions for one of two with channels.
+    """
+    bits = table.shape[0].bit_length() - 1
+    # One 16-bit number per colour, built with in-place integer operations: this runs on every pixel of every frame.
+    index = image[..., 0].astype(np.uint16)
+    index >>= 8 - bits
+    for channel in (1, 2):
+        index <<= bits
+        index |= image[..., channel] >> (8 - bits)
+    return np.asarray(np.take(table.ravel(), index, mode="clip"), np.uint8)
 
 
 def _mixture(x: Array, parts: tuple[Gaussian, ...]) -> Array:

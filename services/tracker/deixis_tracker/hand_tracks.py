@@ -1,0 +1,186 @@
+"""Follows the hands of all persons: which blob belongs to which track, what of it is the hand, which hands are new or lost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from deixis_tracker.classifier import Features, label
+from deixis_tracker.config import TrackerConfig
+from deixis_tracker.hands import Hand, cut_hand, thickness
+from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
+from deixis_tracker.kalman import PointFilter
+from deixis_tracker.messages import is_shown
+from deixis_tracker.persons import MOST_HANDS, HandTrack, Person
+from deixis_tracker.seconds import Step
+from deixis_tracker.segmentation import Blob
+
+HAND_ACCELERATION = 60.0  # head widths per second squared
+HAND_SPEED = 16.0  # head widths per second; a quick wave reaches 2 to 3 m/s
+LEAP, MOST_LEAP = 0.5, 3.0  # head widths between two sightings of one hand, beside that speed, and at most
+UNSEEN_SPEED_KEPT = 0.6**30  # of a hand that is not seen, per second
+EVIDENCE_KEPT = 0.995**30  # per second
+LEAST_SUPPORT = 0.15
+LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
+
+Claim = tuple[Person, HandTrack]
+
+
+class HandTracks:
+    """Keeps the `hands` of persons."""
+
+    def __init__(self, size: tuple[int, int], config: TrackerConfig, ids: Iterator[int]) -> None:
+        """For working pictures of `size` (height, width); `ids` number the tracks."""
+        self._size = size
+        self._config = config
+        self._ids = ids
+
+    def update(self, persons: list[Person], blobs: list[Blob], step: Step) -> None:
+        """Follow all hands into the blobs of the next frame."""
+        tracks = [(person, hand) for person in persons for hand in person.hands]
+        for person, hand in tracks:
+            hand.motion.limit(HAND_SPEED * person.width)
+            hand.motion.predict(step.passed_s)
+            hand.blob = None
+        densities = [self._density(person, hand) for person, hand in tracks]
+        cells = [cells_of(blob.mask, blob.x0, blob.y0) for blob in blobs]
+        supports = np.array([[support(density, c) for c in cells] for density in densities]).reshape(len(tracks), len(blobs))
+        unclaimed: list[Blob] = []
+        for k, claimants in enumerate(best_tracks(supports, LEAST_SUPPORT)):
+            claims = _one_per_arm(claimants, tracks)
+            parts = self._split(blobs[k], cells[k], [tracks[t] for t in claims], [densities[t] for t in claims])
+            seen = [self._observe(person, hand, part, step) for (person, hand), part in parts]
+            if not any(seen):
+                unclaimed.append(blobs[k])
+        for blob in unclaimed:
+            self._find_hand(persons, blob, step)
+        for person in persons:
+            self._settle(person, step)
+
+    def _density(self, person: Person, hand: HandTrack) -> Density:
+        dx, dy = hand.motion.x - hand.pixels[:, 0].mean(), hand.motion.y - hand.pixels[:, 1].mean()
+        return propagate(hand.pixels, dx, dy, min(hand.motion.sigma_px, 0.6 * person.width), *self._size)
+
+    def _split(self, blob: Blob, cells: Cells, claims: list[Claim], densities: list[Density]) -> list[tuple[Claim, Blob]]:
+        """Give each claiming track its pixels of the blob, by density of the hypotheses."""
+        if len(claims) <= 1:
+            return [(claim, blob) for claim in claims]
+        best = np.argmax([density[cells] for density in densities], axis=0)
+        rows, columns = np.nonzero(blob.mask)
+        parts = []
+        for k, claim in enumerate(claims):
+            mask = np.zeros_like(blob.mask)
+            mask[rows[best == k], columns[best == k]] = 1
+            area = int(mask.sum())
+            if area >= self._config.min_hand_area * claim[0].width ** 2:
+                parts.append((claim, blob._replace(mask=mask, area=area)))
+        return parts
+
+    def _cut(self, person: Person, blob: Blob, expected: tuple[float, float] | None, side_x: float) -> Hand | None:
+        shoulders = [person.shoulder(side_x)]
+        if expected is None and blob.x0 < person.x < blob.x0 + blob.mask.shape[1]:
+            shoulders = [person.shoulder(person.x - 1), person.shoulder(person.x + 1)]  # an arm across the body: of either side
+        width, length = person.width, self._config.hand_length
+        hands = [cut_hand(blob.mask, blob.x0, blob.y0, shoulder, width, length, expected) for shoulder in shoulders]
+        hand = max(hands, key=lambda h: min(math.dist(h.tip, shoulder) for shoulder in shoulders))
+        least, most = self._config.min_hand_area * person.width**2, 1.6 * person.width**2
+        if not least <= hand.area <= most or thickness(hand.mask) < LEAST_THICKNESS * person.width:
+            return None
+        return hand
+
+    def _observe(self, person: Person, track: HandTrack, blob: Blob, step: Step) -> bool:
+        side = {"left_hand": 1.0, "right_hand": -1.0, "unknown": track.motion.x - person.x}[track.kind]
+        # Only a raised forearm can have its hand at the end near the shoulder; and a piece of an arm that grows into the
+        # whole arm may have been its elbow.
+        raised = track.on_arm and track.motion.y < person.y + 2.4 * person.width
+        hand = self._cut(person, blob, (track.motion.x, track.motion.y) if raised else None, person.x + side)
+        if hand is None or math.dist(hand.centroid, track.last_seen) > _reach_px(person, track, step):
+            return False
+        track.motion.correct(*hand.centroid, 0.06 * person.width)
+        self._take_in(person, track, hand, blob, step)
+        track.belief.update(_features(person, track, hand, blob), step.passed_s)
+        return True
+
+    def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, step: Step) -> None:
+        track.pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
+        track.blob, track.seen_ns = hand, step.now_ns
+        track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
+        track.watched_s += step.passed_s
+        track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence)
+
+    def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
+        """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
+        x, y = blob.x0 + blob.mask.shape[1] / 2, blob.y0 + blob.mask.shape[0] / 2
+        person = min(persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
+        hand = self._cut(person, blob, None, x)
+        if hand is None or person.distance(*hand.centroid) > self._config.reach:
+            return
+        track = _lost_hand(person, hand, step)
+        if track is not None:  # a blurred hand is lost for some frames, and comes to rest somewhere else
+            track.motion.restart(*hand.centroid, 0.1 * person.width)
+            self._take_in(person, track, hand, blob, step)
+        elif len(person.hands) < MOST_HANDS:
+            motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
+            pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
+            track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
+            track.belief.update(_features(person, track, hand, blob), 1.0)
+            person.hands.append(track)
+
+    def _settle(self, person: Person, step: Step) -> None:
+        """Drop the hands lost, label the others."""
+        for hand in person.hands:
+            if hand.blob is None:
+                hand.motion.damp(step.kept(UNSEEN_SPEED_KEPT))
+        kept = [hand for hand in person.hands if self._may_be_there(person, hand, step)]
+        seen = [hand for hand in kept if hand.blob is not None]
+        for hand, kind in zip(seen, label([h.belief for h in seen], [h.kind for h in seen]), strict=True):
+            hand.kind = kind
+        shown = {hand.kind for hand in seen if is_shown(hand)}
+        person.hands = [hand for hand in kept if hand.blob is not None or hand.kind not in shown]
+
+    def _may_be_there(self, person: Person, hand: HandTrack, step: Step) -> bool:
+        x, y, (height, width) = hand.motion.x, hand.motion.y, self._size
+        near = person.distance(x, y) < 1.3 * self._config.reach
+        recent = step.now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9
+        return near and recent and 0 <= x < width and 0 <= y < height
+
+
+def _one_per_arm(claims: list[int], tracks: list[Claim]) -> list[int]:
+    """Of tracks on one blob keep one per person and side.
+
+    A bare arm that was seen in pieces has a track on each; when the pieces grow together there is only one hand, at the
+    end. Two hands that touch are both known by their sides.
+    """
+    kept: dict[tuple[int, str], int] = {}
+    for t in sorted(claims, key=lambda t: (tracks[t][1].kind == "unknown", -tracks[t][1].watched_s)):
+        person, hand = tracks[t]
+        known = [kind for owner, kind in kept if owner == person.person_id]
+        if hand.kind in known or (hand.kind == "unknown" and known):
+            person.hands.remove(hand)
+        else:
+            kept[person.person_id, hand.kind] = t
+    return sorted(kept.values())
+
+
+def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob) -> Features:
+    w = person.width
+    speed = math.hypot(track.motion.vx, track.motion.vy) / w
+    dx, dy = (track.motion.x - person.x) / w, (track.motion.y - person.y) / w
+    return Features(dx, dy, speed, hand.area / w**2, blob.evidence, blob.sure)
+
+
+def _lost_hand(person: Person, hand: Hand, step: Step) -> HandTrack | None:
+    """The hand not seen now that may have come to where `hand` was found, the nearest."""
+    near = []
+    for track in person.hands:
+        gap = math.dist(track.last_seen, hand.centroid)
+        if track.blob is None and gap < _reach_px(person, track, step):
+            near.append((gap, track.track_id, track))
+    return min(near)[2] if near else None
+
+
+def _reach_px(person: Person, track: HandTrack, step: Step) -> float:
+    """How far a hand can be from where it was seen last."""
+    return person.width * min(MOST_LEAP, LEAP + HAND_SPEED * (step.now_ns - track.seen_ns) / 1e9)

@@ -1,0 +1,72 @@
+"""One frame as the tracker looks at it: at working resolution, at half of it, and through windows.
+
+A quarter of the pixels costs a quarter of the time, and averaging four pixels takes away most of the sensor's noise: so room,
+skin and silhouettes are judged coarsely. Outlines of hands are refined at full resolution, inside the few regions found.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+
+COARSE = 0.5
+
+
+class Views(NamedTuple):
+    """One frame: as given, and `scale` of its pixels to one of the working picture; `full` (H, W, 3) and grey at working
+    resolution; `coarse`, P(skin) and what changed at half of it.
+    """
+
+    frame: Image
+    scale: float
+    full: Image
+    grey: Image
+    coarse: Image
+    skin: Image
+    changed: Mask
+
+
+class Box(NamedTuple):
+    """Left, top, width, height in pixels."""
+
+    x: float
+    y: float
+    w: float
+    h: float
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Centre (x, y)."""
+        return self.x + self.w / 2, self.y + self.h / 2
+
+    def scaled(self, factor: float) -> Box:
+        """The same box in a picture scaled by `factor`."""
+        return Box(self.x * factor, self.y * factor, self.w * factor, self.h * factor)
+
+    def window(self, height: int, width: int) -> tuple[slice, slice]:
+        """Rows and columns of the part inside a picture; empty slices when it lies outside."""
+        x0, y0 = (min(max(0, int(v)), limit) for v, limit in ((self.x, width), (self.y, height)))
+        x1, y1 = (min(max(0, round(v)), limit) for v, limit in ((self.x + self.w, width), (self.y + self.h, height)))
+        return slice(y0, max(y0, y1)), slice(x0, max(x0, x1))
+
+
+def around(x: float, y: float, left: float, top: float, right: float, bottom: float) -> Box:
+    """Box that reaches so far from a point in each direction."""
+    return Box(x - left, y - top, left + right, top + bottom)
+
+
+def coarsened(image: Image) -> Image:
+    """(H, W, 3) at half resolution."""
+    size = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def to_frame(x: float, y: float, scale: float) -> tuple[float, float]:
+    """A point of the working picture in the frame; pixel centres are at integers."""
+    return (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5

@@ -1,0 +1,70 @@
+from itertools import count
+
+import numpy as np
+import pytest
+from deixis_tracker.background import Background, MotionHistory
+from deixis_tracker.config import TrackerConfig
+from deixis_tracker.hand_tracks import HandTracks
+from deixis_tracker.heads import HeadColours
+from deixis_tracker.hypotheses import sample_pixels
+from deixis_tracker.kalman import PointFilter
+from deixis_tracker.messages import tracks_of
+from deixis_tracker.persons import HandTrack, Person
+from deixis_tracker.seconds import Step
+from deixis_tracker.segmentation import Blob, hand_blobs
+from deixis_tracker.skin import SkinModel
+from deixis_tracker.views import Views, coarsened
+
+STEP = Step(1_033_333_333, 1_033_333_333, 33_333_333)
+SKIN, WALL = (90, 120, 190), (200, 150, 110)
+
+
+def hand_at(number, kind, x, y):
+    pixels = sample_pixels(np.ones((30, 30), np.uint8), x, y)
+    motion = PointFilter(x + 14.5, y + 14.5, 3.0, 3000.0)
+    return HandTrack(number, motion, pixels, None, 1_000_000_000, kind, evidence=1.0, watched_s=1.0)
+
+
+@pytest.fixture
+def person():
+    somebody = Person(0, 0, PointFilter(320, 100, 1.0, 1000.0), 50.0, HeadColours(), 0, 0, 0)
+    somebody.hands = [hand_at(1, "right_hand", 280, 240), hand_at(2, "left_hand", 310, 240)]
+    return somebody
+
+
+def contours_of(person):
+    tracks = tracks_of(person, STEP.now_ns, 1.0)[1:]
+    return {t.kind: np.frombuffer(t.contour, "<i2").reshape(-1, 2) for t in tracks}
+
+
+def test_two_hands_grown_into_one_blob_are_published_with_a_contour_each(person):
+    folded = Blob(np.ones((30, 60), np.uint8), 280, 240, 1800, 1.0, 0.9)
+    HandTracks((480, 640), TrackerConfig(), count(3)).update([person], [folded], STEP)
+    contours = contours_of(person)
+    assert contours["right_hand"][:, 0].max() < contours["left_hand"][:, 0].min()
+
+
+def test_a_hand_that_is_only_predicted_has_no_contour(person):
+    HandTracks((480, 640), TrackerConfig(), count(3)).update([person], [], STEP)
+    assert [len(contour) for contour in contours_of(person).values()] == [0, 0]
+
+
+def test_the_contour_of_a_bare_arm_is_that_of_the_hand_alone(person):
+    person.hands = person.hands[:1]
+    arm = np.ones((150, 30), np.uint8)
+    HandTracks((480, 640), TrackerConfig(), count(3)).update([person], [Blob(arm, 280, 150, 4500, 1.0, 0.9)], STEP)
+    assert np.ptp(contours_of(person)["right_hand"][:, 1]) < 1.3 * person.width
+
+
+def test_a_region_that_is_gone_at_full_resolution_is_no_blob(person):
+    full = np.full((480, 640, 3), WALL, np.uint8)
+    room = coarsened(full)
+    seen = room.copy()
+    seen[150:180, 160:162] = SKIN
+    model = SkinModel(0.2)
+    changed = np.asarray(255 * np.any(seen != room, axis=2), np.uint8)
+    views = Views(full, 1.0, full, full[..., 0], seen, np.asarray(changed * (model.probability(seen) > 150)), changed)
+    background = Background(room, 20)
+    background.changed(seen, np.zeros_like(changed))
+    assert np.count_nonzero(views.skin) > 50
+    assert hand_blobs(views, model, background, MotionHistory(room), [person], TrackerConfig()) == []
