@@ -13,6 +13,8 @@ from deixis_schemas import codec
 from deixis_schemas.messages import Message
 
 MAX_WAITING = 64
+# An edit has no answer that would tell of its loss: a site's worth of POIs in one burst, many times over, is kept.
+MAX_EDITS = 10_000
 MAX_PAYLOAD_BYTES = 1 << 20
 
 
@@ -111,13 +113,13 @@ class EditQueue:
         self._report = report
         self._lock = threading.Lock()
         self._waiting: deque[zenoh.Sample] = deque()
-        self.overflowed = 0
+        self.lost = 0
 
     def store(self, sample: zenoh.Sample) -> None:
-        """Callback of the Zenoh subscriber. Past the bound the newest is refused: an edit already heard is not forgotten."""
+        """Callback of the Zenoh subscriber. Past the bound the newest is `lost`: an edit already heard is not forgotten."""
         with self._lock:
-            if len(self._waiting) >= MAX_WAITING:
-                self.overflowed += 1
+            if len(self._waiting) >= MAX_EDITS:
+                self.lost += 1
             else:
                 self._waiting.append(sample)
         self._wake()
@@ -131,8 +133,8 @@ class EditQueue:
         with self._lock:
             samples = list(self._waiting)
             self._waiting.clear()
-        if self.overflowed:
-            self._report("edits", f"{self.overflowed} edits refused so far: more than {MAX_WAITING} waited at once")
+        if self.lost:
+            self._report("edits", f"{self.lost} edits lost so far: more than {MAX_EDITS} waited at once")
         return [_edit_of(sample) for sample in samples]
 
 
