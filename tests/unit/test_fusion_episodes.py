@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.episodes import EpisodeTracker, Stroke
+from deixis_fusion.evidence import Sample, hand_over, head_over
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import RobotPlace
-from deixis_fusion.stroke import Sample, hand_over, head_over
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     Belief,
     CameraInfo,
@@ -51,12 +52,16 @@ def pose(yaw: float | None, status: str = "tracking", **more: Any) -> HeadPose:
 REST = gesture("none", "idle")
 
 
+def sample(frame: int, hand: Gesture | None, head: HeadPose | None) -> Sample:
+    return Sample(stamp(frame), stamp(frame), hand, head)
+
+
 def follow(story: list[tuple[int, Gesture | None]]) -> list[Stroke]:
     """The episodes that come of (number of frames, gesture) in turn."""
-    tracker, ended, frame = EpisodeTracker(1, CONFIG), [], 0
+    tracker, ended, frame = EpisodeTracker(1, CONFIG.episodes), [], 0
     for count, shown in story:
         for _ in range(count):
-            ended.append(tracker.observe(Sample(stamp(frame), shown, pose(60))))
+            ended.append(tracker.observe(sample(frame, shown, pose(60))))
             frame += 1
     ended.append(tracker.finish())
     return [stroke for stroke in ended if stroke is not None]
@@ -64,7 +69,7 @@ def follow(story: list[tuple[int, Gesture | None]]) -> list[Stroke]:
 
 def test_one_stroke_is_one_episode() -> None:
     (stroke,) = follow([(10, REST), (45, gesture()), (20, REST)])
-    assert (stroke.started_ns, stroke.last_pointing_ns) == (stamp(10), stamp(54))
+    assert (stroke.first.stamp_ns, stroke.last.stamp_ns) == (stamp(10), stamp(54))
     assert len(stroke.samples) == 45
 
 
@@ -100,8 +105,8 @@ def test_a_stroke_that_is_mostly_an_open_hand_is_no_episode() -> None:
 
 def test_a_hand_that_swings_to_the_other_side_begins_another_episode() -> None:
     first, second = follow([(30, gesture("point_left")), (3, REST), (30, gesture("point_right")), (20, REST)])
-    assert {sample.pointing for sample in first.samples} == {"point_left"}
-    assert {sample.pointing for sample in second.samples} == {"point_right"}
+    assert {shown.pointing for shown in first.samples} == {"point_left"}
+    assert {shown.pointing for shown in second.samples} == {"point_right"}
 
 
 def test_a_flicker_of_the_other_side_does_not_split_an_episode() -> None:
@@ -114,18 +119,18 @@ def test_every_episode_has_an_id_of_its_own() -> None:
 
 
 def test_evidence_is_bounded_however_long_the_hand_is_held() -> None:
-    tracker = EpisodeTracker(1, CONFIG)
+    tracker = EpisodeTracker(1, CONFIG.episodes)
     for frame in range(3000):
-        tracker.observe(Sample(stamp(frame), gesture(), None))
+        tracker.observe(sample(frame, gesture(), None))
     assert tracker.stroke is not None
-    assert len(tracker.stroke.samples) <= CONFIG.max_evidence_s * FPS + 2
+    assert len(tracker.stroke.samples) <= CONFIG.episodes.max_evidence_s * FPS + 2
 
 
 # --- evidence of a stroke ---------------------------------------------------------------------------------------------
 
 
 def samples(hands: Sequence[Gesture | None], heads: Sequence[HeadPose | None]) -> list[Sample]:
-    return [Sample(stamp(i), hand, head) for i, (hand, head) in enumerate(zip(hands, heads, strict=True))]
+    return [sample(i, hand, head) for i, (hand, head) in enumerate(zip(hands, heads, strict=True))]
 
 
 def test_more_frames_do_not_make_a_stroke_more_certain() -> None:
@@ -157,17 +162,17 @@ def test_a_head_that_was_not_tracked_says_nothing(shown: HeadPose | None) -> Non
 
 def test_the_hand_goes_by_the_vote_and_a_finger_seen_now_and_then_counts() -> None:
     kinds = ["point_left"] * 12 + ["invisible"] * 18
-    hand, side = hand_over(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0)
+    hand = hand_over(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0)
     assert hand is not None
-    assert (hand.gesture, side) == ("point_left", "left")
-    hand, _ = hand_over(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0)
+    assert (hand.gesture, hand.hand) == ("point_left", "left")
+    hand = hand_over(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0)
     assert hand is not None
     assert hand.gesture == "invisible"
 
 
 def test_mirrored_bearings_are_taken_from_the_front_whichever_was_named() -> None:
     told = [gesture(bearing_deg=b, bearing_sigma_deg=10, bearing_mirrored=True) for b in [50.0, 130.0, 52.0, 128.0, 51.0]]
-    hand, _ = hand_over(samples([*told], [None] * 5), 0.0)
+    hand = hand_over(samples([*told], [None] * 5), 0.0)
     assert hand is not None
     assert hand.bearing_deg == pytest.approx(51, abs=1)
     assert hand.mirrored
@@ -191,11 +196,11 @@ class Scene:
             "height": 480,
         }
         self.fusion.set_camera(CameraInfo.model_validate(content | {"camera_matrix": K}))
-        self.fusion.set_robot(robot)
+        self.fusion.start_robot_at(robot)
         self.robot = robot
         self.pois = [self.poi(poi_id, bearing) for poi_id, bearing in BEARINGS.items()]
         self.fusion.set_pois(self.pois)
-        self.frame = 0
+        self.frame, self.run, self.shift_ns = 0, 1, 0
         self.beliefs: list[Belief] = []
         self.targets: list[Target] = []
 
@@ -219,8 +224,9 @@ class Scene:
     ) -> None:
         """So many frames of this."""
         for _ in range(count):
-            about: dict[str, Any] = {"seq": self.frame, "stamp_ns": stamp(self.frame), "instance": "x"}
-            width = 560 * CONFIG.face_width_m / 2
+            about: dict[str, Any] = {"run": self.run, "seq": self.frame, "stamp_ns": stamp(self.frame) + self.shift_ns}
+            about["instance"] = "x"
+            width = 560 * FACE_WIDTH_M / 2
             face = Track.model_validate(
                 {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
                 | {"bbox_px": (320 - width / 2, 215, width, 60), "velocity_px_s": (0, 0)}
@@ -410,7 +416,7 @@ def test_updates_come_on_change_and_at_a_bounded_rate() -> None:
     updates = [target for target in scene.targets if not target.final]
     assert 1 <= len(updates) <= 5
     gaps = [b.stamp_ns - a.stamp_ns for a, b in itertools.pairwise(updates)]
-    assert all(gap >= CONFIG.update_every_s * 1e9 for gap in gaps)
+    assert all(gap >= CONFIG.answer.update_every_s * 1e9 for gap in gaps)
 
 
 def test_ages_and_latency_are_told_where_time_runs() -> None:
