@@ -24,6 +24,7 @@ from deixis_schemas.messages import (
     HeadPoses,
     Poi,
     Producer,
+    RobotPose,
     Target,
     Track,
     Tracks,
@@ -235,7 +236,7 @@ class Scene:
             poses = HeadPoses(**about, stage="headpose", poses=[head] if head else [])
             gestures = Gestures(**about, stage="gesture", gestures=[hand] if hand else [])
             frame = JoinedFrame(
-                tracks=tracks,
+                tracks=None if "tracker" in without else tracks,
                 poses=None if "headpose" in without else poses,
                 gestures=None if "gesture" in without else gestures,
                 missing=without,
@@ -448,3 +449,81 @@ def test_masses_of_every_source_are_shown_and_sum_to_one() -> None:
     point(scene, 60)
     for said in scene.finals[0].evidence:
         assert sum(focal.mass for focal in said.masses) == pytest.approx(1.0)
+
+
+# --- runs and clocks --------------------------------------------------------------------------------------------------
+
+
+def test_a_clock_set_back_by_forty_milliseconds_neither_ends_nor_prolongs_an_episode() -> None:
+    steady, stepped = Scene(), Scene()
+    for scene in (steady, stepped):
+        scene.show(15, REST, pose(0))
+        scene.show(40, gesture(bearing_deg=60, bearing_sigma_deg=10), pose(60))
+        scene.show(4, REST, pose(0))
+        scene.shift_ns = -40_000_000 if scene is stepped else 0
+        scene.show(4, REST, pose(0))
+        assert scene.finals == []
+        scene.show(4, REST, pose(0))
+    (before,), (after,) = steady.finals, stepped.finals
+    assert (after.seq, after.poi_ids, after.started_ns, after.ended_ns) == (before.seq, ["g"], stamp(15), stamp(54))
+    assert after.stamp_ns == before.stamp_ns - 40_000_000
+
+
+def test_a_clock_set_back_by_an_hour_does_not_keep_a_place_for_an_hour() -> None:
+    scene = Scene()
+    scene.show(5, REST, pose(0))
+    scene.shift_ns = -(10**12)
+    scene.show(5, REST, pose(0))
+    assert scene.beliefs[-1].persons[0].position_m is not None
+    scene.show(70, None, None, person=False)
+    scene.show(1, None, None, without=("tracker",))
+    assert scene.fusion.persons == []
+
+
+def test_a_new_run_ends_the_episodes_of_the_last_and_forgets_its_persons() -> None:
+    scene = Scene()
+    scene.show(30, gesture(bearing_deg=60, bearing_sigma_deg=10), pose(60))
+    (episode_id,) = scene.fusion.open_episodes()
+    scene.run, scene.frame = 2, 0
+    scene.show(1, gesture(), pose(60))
+    (final,) = scene.finals
+    assert (final.episode_id, final.poi_ids, final.frame_id) == (episode_id, ["g"], (1, 29))
+    assert scene.beliefs[-1].frame_id == (2, 0)
+    assert scene.beliefs[-1].persons[0].episode_id is None
+    assert scene.fusion.open_episodes() == []
+
+
+def test_the_robots_pose_is_that_of_the_frames_stamp() -> None:
+    scene = Scene()
+    for i in range(10):
+        turned = {"x_m": 0, "y_m": 0, "yaw_deg": math.degrees(0.1 * i)}
+        about = {"stage": "robot", "instance": "r", "stamp_ns": stamp(0) + i * 10**8}
+        scene.fusion.hear_robot(RobotPose.model_validate(about | turned))
+    scene.show(1, REST, pose(0))
+    (person,) = scene.beliefs[-1].persons
+    assert person.position_m is not None
+    assert person.position_m[:2] == pytest.approx((2, 0), abs=0.02)
+    assert [said.source for said in person.evidence] == ["gesture", "headpose"]
+
+
+def test_an_old_pose_of_the_robot_is_used_and_said_in_evidence_and_reason() -> None:
+    scene = Scene()
+    about = {"stage": "robot", "instance": "r", "stamp_ns": stamp(0) - 3 * 10**9}
+    scene.fusion.hear_robot(RobotPose.model_validate(about | {"x_m": 0, "y_m": 0, "yaw_deg": 0}))
+    point(scene, 60)
+    (final,) = scene.finals
+    assert final.poi_ids == ["g"]
+    assert final.evidence[2].source == "robot"
+    assert (final.evidence[2].status, final.evidence[2].weight) == ("late", 0)
+    assert "s older than the frame" in final.evidence[2].observed
+    assert "robot/pose is in doubt" in final.reason
+    assert "s older than the frame" in scene.fusion.robot_doubt
+
+
+def test_the_mirror_of_minus_sixty_is_minus_one_hundred_and_twenty() -> None:
+    scene = Scene()
+    hand = gesture("point_right", bearing_deg=-60, bearing_sigma_deg=10, bearing_mirrored=True)
+    scene.show(30, hand, pose(-60))
+    (final,) = scene.fusion.end(None)
+    assert final.evidence[0].observed == "point_right, bearing -60.0 or -120.0 +- 10.0 deg"
+    assert "(about -60 or -120 +- 10 deg)" in final.reason

@@ -23,7 +23,7 @@ NOTABLE_CONFLICT = 0.7
 MAX_TITLE = 60
 MAX_TIED_NAMED = 8
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
-MAX_MEMBERS = 128
+MAX_MEMBERS = 96
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ KEPT_S = 5.0
 MAX_GAP_S = 1.0
 # After this, a silent robot is taken to stand where it said last, not where its last speed would have carried it.
 EXTRAPOLATED_S = 0.2
+# Speed from poses closer together would be their noise.
+BASELINE_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -66,10 +68,11 @@ class RobotPath:
         return RobotFix(self._between(stamp_ns))
 
     def _beyond(self, newest: RobotPose, stamp_ns: int, ahead_s: float) -> RobotPlace:
-        if len(self._poses) < 2 or ahead_s > EXTRAPOLATED_S:
+        enough_ns = newest.stamp_ns - int(BASELINE_S * 1e9)
+        before = next((pose for pose in reversed(self._poses) if pose.stamp_ns <= enough_ns), None)
+        if before is None or ahead_s > EXTRAPOLATED_S or not _moves(before, newest):
             return _place(newest)
-        before = self._poses[-2]
-        return _along(before, newest, stamp_ns) if _moves(before, newest) else _place(newest)
+        return _along(before, newest, stamp_ns)
 
     def _between(self, stamp_ns: int) -> RobotPlace:
         after = bisect_right([pose.stamp_ns for pose in self._poses], stamp_ns)
