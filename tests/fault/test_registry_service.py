@@ -256,7 +256,7 @@ def test_the_state_answers_as_long_as_it_is_asked_for(bench: Bench) -> None:
     for i in range(20):
         bench.session.put(f"deixis/{bench.robot}/fusion/poi/p{i:02}", json.dumps({"position_m": [i, 0, 0]}).encode())
     wait_until(lambda: bench.state().pois_total == 20, "20 POIs")
-    assert (len(bench.state().pois), len(bench.state("?top=20").pois)) == (16, 20)
+    assert (len(bench.state().pois), len(bench.state("?top=20;format=msgpack").pois)) == (16, 20)
     assert [poi.poi_id for poi in bench.state("?poi=p19").pois] == ["p19"]
     assert bench.ask("fusion/state?top=0") == ("refused", "top: '0' is not a whole number from 1 to 1024")
     assert bench.ask("fusion/state?poi=ghost") == ("refused", "poi: there is no POI 'ghost'")
