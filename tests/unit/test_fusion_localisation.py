@@ -18,7 +18,7 @@ from deixis_fusion.localisation import (
     PersonPlace,
     RobotPlace,
     bearing_deg,
-    bearing_sigma_deg,
+    bearing_with_sigma_deg,
     depth_of_face,
     locate,
     to_base,
@@ -149,7 +149,7 @@ def test_a_place_is_held_for_a_while_when_the_face_is_not_seen() -> None:
 
 
 def test_an_uncertain_distance_blurs_what_lies_to_the_side_and_not_what_lies_ahead() -> None:
-    beside, ahead = bearing_sigma_deg(place(2, 0), (2, -1, 1), 0.0), bearing_sigma_deg(place(2, 0), (1, 0, 1), 0.0)
+    (_, beside), (_, ahead) = (bearing_with_sigma_deg(place(2, 0), target, 0.0) for target in ((2, -1, 1), (1, 0, 1)))
     assert beside == pytest.approx(math.degrees(math.atan(0.1)), rel=0.01)
     assert ahead == pytest.approx(0, abs=1e-6)
 
@@ -190,10 +190,10 @@ def test_sight_is_mutual(ax: float, ay: float, bx: float, by: float) -> None:
     assert sees((ax, ay), (bx, by), [WALL], 0.0) == sees((bx, by), (ax, ay), [WALL], 0.0)
 
 
-def test_the_frame_of_discernment_holds_the_visible_pois_by_id() -> None:
+def test_the_frame_of_discernment_holds_the_visible_pois_in_their_order() -> None:
     pois = [
-        Poi(poi_id="b", position_m=(2.5, 0, 1)),
         Poi(poi_id="a", position_m=(0, 2, 1)),
+        Poi(poi_id="b", position_m=(2.5, 0, 1)),
         Poi(poi_id="c", position_m=(0, 1, 1)),
     ]
     found = frame_of_discernment(place(0.5, 0), pois, [WALL], 0.15)

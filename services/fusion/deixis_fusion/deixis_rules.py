@@ -121,9 +121,10 @@ def head_assignment(head: HeadObservation, seen: Sequence[Candidate], config: He
         return _out_of_range(head, seen, config).discounted(rate)
     size = len(seen)
     sigma = head.yaw_sigma_deg or 0.0
-    told = 1 - config.outlier - config.at_robot
+    told, gains = 1 - config.outlier - config.at_robot, _gains(config)
     weights = {
-        1 << i: told / size * head_likelihood(head.yaw_deg, sigma, candidate, config) for i, candidate in enumerate(seen)
+        1 << i: told / size * _head_likelihood(head.yaw_deg, sigma, candidate, gains, config)
+        for i, candidate in enumerate(seen)
     }
     at_robot = normal(head.yaw_deg, math.hypot(sigma, LOOK_AT_ROBOT_SIGMA_DEG))
     everything = everything_of(size)
@@ -132,10 +133,12 @@ def head_assignment(head: HeadObservation, seen: Sequence[Candidate], config: He
     return normalised(size, weights).discounted(rate)
 
 
-def head_likelihood(yaw_deg: float, yaw_sigma_deg: float, candidate: Candidate, config: HeadConfig) -> float:
+def _head_likelihood(
+    yaw_deg: float, yaw_sigma_deg: float, candidate: Candidate, gains: Sequence[float], config: HeadConfig
+) -> float:
     """P(yaw | POI), per degree: a mixture over the part of the way that people turn the head.
 
-    The part `full_turn` of them turns all the way, the others anything from `gain_min` to `gain_max`.
+    The part `full_turn` of them turns all the way, the others any of the `gains`.
     """
     bearing = candidate.bearing_deg
 
@@ -145,7 +148,7 @@ def head_likelihood(yaw_deg: float, yaw_sigma_deg: float, candidate: Candidate, 
 
     overshoot = math.copysign(min(config.overshoot_deg, abs(bearing) / 10), bearing)
     full = at(bearing + overshoot, 1.0)
-    partial = math.fsum(at(gain * bearing, gain) for gain in _gains(config)) / GAIN_STEPS
+    partial = math.fsum(at(gain * bearing, gain) for gain in gains) / GAIN_STEPS
     return config.full_turn * full + (1 - config.full_turn) * partial
 
 

@@ -64,6 +64,9 @@ class Sample:
         return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
 
 
+Weighed = Sequence[tuple[Sample, float]]
+
+
 @dataclass(frozen=True)
 class HandObservation:
     """A pointing stroke: the gesture recognised and, where it could be told, the bearing pointed to and by which hand.
@@ -145,12 +148,13 @@ def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Wi
     """A stage that is dead counts for nothing from then on. One that is only late counts by what it said a moment ago."""
     gesture, headpose = stages[GESTURE], stages[HEADPOSE]
     posed = [sample for sample in stroke if sample.pose is not None]
+    weighed = weigh(stroke, config.settle_s)
     hand, head = None, None
     if _counts(gesture, stroke, latest, config):
-        hand = hand_over(stroke, config.settle_s)
+        hand = hand_over(weighed)
         gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
     if _counts(headpose, posed, latest, config):
-        head = head_over(stroke, config.settle_s)
+        head = head_over(weighed)
         headpose = _head_witness(head, stroke[-1].pose, headpose, posed[-1].stamp_ns if posed else None)
     return Evidence(hand, gesture, head, headpose)
 
@@ -164,9 +168,9 @@ def _counts(stage: Witness, told: Sequence[Sample], latest: Sample, config: Epis
 # --- the hand ---------------------------------------------------------------------------------------------------------
 
 
-def hand_over(samples: Sequence[Sample], settle_s: float) -> HandObservation | None:
+def hand_over(weighed: Weighed) -> HandObservation | None:
     """The pointing hand over a stroke; none without a pointing sample."""
-    weighted = [(sample, weight) for sample, weight in _weighted(samples, settle_s) if sample.pointing]
+    weighted = [(sample, weight) for sample, weight in weighed if sample.pointing]
     if not weighted:
         return None
     gesture, agreement = _vote(weighted)
@@ -182,7 +186,7 @@ def hand_over(samples: Sequence[Sample], settle_s: float) -> HandObservation | N
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand)
 
 
-def _vote(weighted: Sequence[tuple[Sample, float]]) -> tuple[PointingGesture, float]:
+def _vote(weighted: Weighed) -> tuple[PointingGesture, float]:
     """The gesture that most frames saw, and its share. A finger seen now and then outweighs "invisible"."""
     votes: dict[PointingGesture, float] = dict.fromkeys(POINTING, 0.0)
     for sample, weight in weighted:
@@ -229,11 +233,10 @@ def head_now(pose: HeadPose | None) -> HeadObservation | None:
     return HeadObservation(pose.yaw_deg if pose.status == "tracking" else None, pose.yaw_sigma_deg, pose.side)
 
 
-def head_over(samples: Sequence[Sample], settle_s: float) -> HeadObservation | None:
+def head_over(weighed: Weighed) -> HeadObservation | None:
     """The head over a stroke; none where it was tracked in too few frames to tell."""
-    weighted = _weighted(samples, settle_s)
-    total = math.fsum(weight for _, weight in weighted)
-    poses = [(s.pose, w) for s, w in weighted if s.pose is not None and s.pose.status in ("tracking", "out_of_range")]
+    total = math.fsum(weight for _, weight in weighed)
+    poses = [(s.pose, w) for s, w in weighed if s.pose is not None and s.pose.status in ("tracking", "out_of_range")]
     tracked = [(pose, weight) for pose, weight in poses if pose.status == "tracking"]
     beyond = [(pose, weight) for pose, weight in poses if pose.status == "out_of_range"]
     tracked_share = math.fsum(weight for _, weight in tracked) / total if total else 0.0
@@ -262,6 +265,14 @@ def _head_witness(head: HeadObservation | None, pose: HeadPose | None, stage: Wi
 # --- weighing frames --------------------------------------------------------------------------------------------------
 
 
+def weigh(samples: Sequence[Sample], settle_s: float) -> Weighed:
+    """The samples of a stroke with their weights: at the start of a stroke the head may still be on its way."""
+    if not samples:
+        return []
+    settled_ns = samples[0].at_ns + int(settle_s * 1e9)
+    return [(sample, 1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT) for sample in samples]
+
+
 def median_and_spread(weighted: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Weighted median, and the weighted median absolute deviation from it as a standard deviation."""
     centre = _median(weighted)
@@ -277,14 +288,6 @@ def _median(weighted: Sequence[tuple[float, float]]) -> float:
         if reached >= half:
             return value
     return ordered[-1][0]
-
-
-def _weighted(samples: Sequence[Sample], settle_s: float) -> list[tuple[Sample, float]]:
-    """Samples with weights: at the start of a stroke the head may still be on its way."""
-    if not samples:
-        return []
-    settled_ns = samples[0].at_ns + int(settle_s * 1e9)
-    return [(sample, 1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT) for sample in samples]
 
 
 def _majority(weighted: Sequence[tuple[T, float]]) -> T | None:

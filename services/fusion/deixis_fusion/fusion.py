@@ -99,8 +99,8 @@ class Fusion:
         self.recent: deque[TargetReport] = deque(maxlen=KEPT_TARGETS)
 
     def set_pois(self, pois: Sequence[Poi]) -> None:
-        """The POIs that may be meant from now on, by id."""
-        self._pois = tuple(pois)
+        """The POIs that may be meant from now on."""
+        self._pois = sorted(pois, key=lambda poi: poi.poi_id)
 
     def set_walls(self, walls: Sequence[Wall]) -> None:
         """What nobody sees through: segments in the map frame, metres."""
@@ -141,7 +141,7 @@ class Fusion:
         The first frame of a run ends the episodes of the last one; its persons are forgotten. `statuses` speaks for the
         stages that are missing in the frame. `now_ns` is Unix time, or none in lockstep, where ages and latencies are 0.
         """
-        source = OfFrame.derive(frame.source, self._producer)
+        source = frame.source
         new_run, at_ns, _ = self._clock.advance(source.run, source.stamp_ns)
         targets = self.end(now_ns) if new_run else []
         moment = _Moment(source, at_ns, stages_of(frame, statuses), self.robot.at(source.stamp_ns), now_ns)
@@ -228,7 +228,7 @@ class Fusion:
         self, person: _Person, stroke: Stroke, assessment: Assessment, moment: _Moment, now_ns: int | None, final: bool = False
     ) -> Target:
         report = TargetReport(
-            frame=moment.frame,
+            frame=OfFrame.derive(moment.frame, self._producer),
             person_id=person.person_id,
             episode_id=stroke.episode_id,
             started_ns=stroke.first.stamp_ns,

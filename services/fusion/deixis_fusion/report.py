@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import nsmallest
 from itertools import islice
 
 from deixis_schemas import messages
@@ -130,8 +129,9 @@ class TargetReport:
 def _rows(judgement: Judgement, rows: Rows) -> list[PoiBelief]:
     """The standing of the POIs asked for, best first."""
     seen, pignistic = judgement.seen, judgement.pignistic
-    asked = [i for i in range(len(seen)) if rows.poi_id in (None, seen[i].poi.poi_id)]
-    chosen = nsmallest(rows.top, asked, key=lambda i: (-pignistic[i], i))
+    chosen = sorted(range(len(seen)), key=pignistic.__getitem__, reverse=True)
+    if rows.poi_id is not None:
+        chosen = [i for i in chosen if seen[i].poi.poi_id == rows.poi_id]
     plausible = judgement.combination.belief.plausibilities()
     single = judgement.combination.belief.singletons()
     return [
@@ -139,7 +139,7 @@ def _rows(judgement: Judgement, rows: Rows) -> list[PoiBelief]:
             poi_id=seen[i].poi.poi_id, mass=single[i], belief=single[i], plausibility=plausible[i], pignistic=pignistic[i],
             bearing_deg=seen[i].bearing_deg,
         )
-        for i in chosen
+        for i in chosen[: rows.top]
     ]  # fmt: skip
 
 
@@ -183,9 +183,9 @@ def _source(
 
 def _focal_sets(assignment: BeliefAssignment, seen: Sequence[Candidate]) -> list[messages.FocalSet]:
     """The sets of largest mass, each with its first members."""
-    largest = nsmallest(MAX_LISTED, assignment.masses.items(), key=lambda item: (-item[1], item[0]))
+    largest = sorted(assignment.masses.items(), key=lambda item: (-item[1], item[0]))
     sets, left = [], MAX_MEMBERS
-    for subset, mass in largest:
+    for subset, mass in largest[:MAX_LISTED]:
         named = [seen[i].poi.poi_id for i in islice(members(subset), min(left, MAX_LISTED))]
         left -= len(named)
         if mass > 0:

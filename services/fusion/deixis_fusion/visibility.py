@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from deixis_schemas.messages import Poi
 
-from .localisation import PersonPlace, bearing_deg, bearing_sigma_deg
+from .localisation import PersonPlace, bearing_with_sigma_deg
 
 Point2 = tuple[float, float]
 Wall = tuple[Point2, Point2]
@@ -27,11 +27,11 @@ class Candidate:
 
 
 def frame_of_discernment(place: PersonPlace, pois: Sequence[Poi], walls: Sequence[Wall], clearance_m: float) -> list[Candidate]:
-    """The POIs in sight of a person, in the order of their ids."""
+    """Those of the POIs that are in sight of a person, in their order."""
     eye = (place.position_m[0], place.position_m[1])
     return [
-        Candidate(poi, bearing_deg(place, poi.position_m), bearing_sigma_deg(place, poi.position_m, poi.extent_m))
-        for poi in sorted(pois, key=lambda poi: poi.poi_id)
+        Candidate(poi, *bearing_with_sigma_deg(place, poi.position_m, poi.extent_m))
+        for poi in pois
         if sees(eye, (poi.position_m[0], poi.position_m[1]), walls, clearance_m)
     ]
 
