@@ -77,8 +77,11 @@ def hand_assignment(hand: HandObservation, seen: Sequence[Candidate], config: Ha
     bearings = [candidate.bearing_deg for candidate in seen]
     size = len(bearings)
     weights = [_gesture_likelihood(hand.gesture, bearing, config) for bearing in bearings]
-    if hand.bearing_deg is not None:
-        weights = [w * _hand_likelihood(hand, candidate, config) for w, candidate in zip(weights, seen, strict=True)]
+    measured = [bearing for bearing in (hand.bearing_deg, hand.mirror_deg) if bearing is not None]
+    if measured:
+        sigma = max(hand.bearing_sigma_deg or 0.0, config.sigma_floor_deg)
+        likelihoods = [_hand_likelihood(measured, sigma, candidate, config.outlier) for candidate in seen]
+        weights = [weight * likelihood for weight, likelihood in zip(weights, likelihoods, strict=True)]
     single = normalised(size, {1 << i: weight for i, weight in enumerate(weights)})
     sets = gesture_sets(hand.gesture, bearings, (config.min_deg, config.max_deg))
     return _mixed(single, sets, config.refinement).discounted(_rate(config.discount, hand.agreement))
@@ -98,13 +101,11 @@ def _gesture_likelihood(gesture: PointingGesture, bearing_deg: float, config: Ha
     return max(WRONG_SIDE, inside * beside + (1 - inside) * row["center"] * agrees)
 
 
-def _hand_likelihood(hand: HandObservation, candidate: Candidate, config: HandConfig) -> float:
-    """P(bearing measured at the hand | POI), per degree, with a uniform tail."""
-    assert hand.bearing_deg is not None
-    sigma = math.hypot(max(hand.bearing_sigma_deg or 0.0, config.sigma_floor_deg), candidate.bearing_sigma_deg)
-    measured = [hand.bearing_deg] if hand.mirror_deg is None else [hand.bearing_deg, hand.mirror_deg]
-    hit = sum(normal(wrapped_deg(value - candidate.bearing_deg), sigma) for value in measured) / len(measured)
-    return (1 - config.outlier) * hit + config.outlier / FULL_CIRCLE_DEG
+def _hand_likelihood(measured: Sequence[float], sigma: float, candidate: Candidate, outlier: float) -> float:
+    """P(bearing measured at the hand | POI), per degree, with a uniform tail; two bearings where it is mirrored."""
+    spread = math.hypot(sigma, candidate.bearing_sigma_deg)
+    hit = sum(normal(wrapped_deg(value - candidate.bearing_deg), spread) for value in measured) / len(measured)
+    return (1 - outlier) * hit + outlier / FULL_CIRCLE_DEG
 
 
 # --- the head ---------------------------------------------------------------------------------------------------------
@@ -154,8 +155,9 @@ def _head_likelihood(
 
 def _out_of_range(head: HeadObservation, seen: Sequence[Candidate], config: HeadConfig) -> BeliefAssignment:
     """Section 6.2: the head is turned beyond its range. Nested sets, the POIs that are surely out there innermost."""
+    gains = _gains(config)
     possible = [
-        _beyond_range(candidate.bearing_deg, config) * _side_fits(head.side, candidate.bearing_deg) for candidate in seen
+        _beyond_range(candidate.bearing_deg, gains, config) * _side_fits(head.side, candidate.bearing_deg) for candidate in seen
     ]
     most = max(possible)
     if most < LEAST_OUT_OF_RANGE:
@@ -174,14 +176,14 @@ def consonant(possibilities: Sequence[float]) -> BeliefAssignment:
     return normalised(size, weights)
 
 
-def _beyond_range(bearing_deg: float, config: HeadConfig) -> float:
+def _beyond_range(bearing_deg: float, gains: Sequence[float], config: HeadConfig) -> float:
     """P(out of range | POI at this bearing), over the part of the way that people turn the head."""
 
     def beyond(yaw: float) -> float:
         return _rise(yaw - config.range_deg, config.range_soft_deg)
 
     size = abs(bearing_deg)
-    partial = math.fsum(beyond(gain * size) for gain in _gains(config)) / GAIN_STEPS
+    partial = math.fsum(beyond(gain * size) for gain in gains) / GAIN_STEPS
     return config.full_turn * beyond(size) + (1 - config.full_turn) * partial
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 from deixis_schemas.messages import Gesture, HeadPose, Side, SourceStatus
 
@@ -97,8 +97,7 @@ class HeadObservation:
     agreement: float = 1.0
 
 
-@dataclass(frozen=True)
-class Witness:
+class Witness(NamedTuple):
     """How one stage stands, its process, and in words what it observed or why nothing. `stamp_ns` is the time it speaks of."""
 
     status: SourceStatus
@@ -107,8 +106,7 @@ class Witness:
     stamp_ns: int | None = None
 
 
-@dataclass(frozen=True)
-class Evidence:
+class Evidence(NamedTuple):
     """What hand and head of one person show, none where nothing can be told, and who says so."""
 
     hand: HandObservation | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from deixis_runtime.lens import LensError
 from deixis_schemas.messages import (
@@ -38,8 +39,7 @@ NOTABLE_CHANGE = 0.05
 KEPT_TARGETS = 16
 
 
-@dataclass(frozen=True)
-class _Moment:
+class _Moment(NamedTuple):
     """The frame that is being answered and its time by `RunClock`; `now_ns` is Unix time, none where it stands still."""
 
     frame: OfFrame

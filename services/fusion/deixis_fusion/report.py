@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 from deixis_schemas import messages
 from deixis_schemas.messages import MAX_LISTED, MAX_TEXT, OfFrame, PersonBelief, Poi, PoiBelief, Producer, Target
@@ -33,8 +34,7 @@ class Rows:
     poi_id: str | None = None
 
 
-@dataclass(frozen=True)
-class Assessment:
+class Assessment(NamedTuple):
     """What is thought of one person at one frame. `judgement` is none where no POI comes into question.
 
     `pois` are all there are; `doubt` says why the robot may have stood elsewhere, if so.
@@ -62,8 +62,7 @@ class Assessment:
         return self.judgement.combination.conflict if self.judgement else 0.0
 
 
-@dataclass(frozen=True)
-class PersonReport:
+class PersonReport(NamedTuple):
     """The standing of one person, from which messages of any length are made. `now_ns` is none where time stands still."""
 
     person_id: int

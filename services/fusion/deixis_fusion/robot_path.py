@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from deixis_schemas.messages import RobotPose
 
@@ -19,8 +19,7 @@ EXTRAPOLATED_S = 0.2
 BASELINE_S = 0.05
 
 
-@dataclass(frozen=True)
-class RobotFix:
+class RobotFix(NamedTuple):
     """Where the robot was at one time, and in `doubt` why that may be wrong; empty where nothing speaks against it."""
 
     place: RobotPlace
