@@ -22,11 +22,12 @@ MAX_TRACKS = 96
 MAX_POIS = 1024
 MAX_CONTOUR_BYTES = 65536
 MAX_LISTED = 16
+MAX_TEXT = 2000
 
 # A name is one part of a key and, of robots, of a path: `.` and `..` are none, and no option begins like one.
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]{0,63}$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-Text = Annotated[str, Field(max_length=2000)]
+Text = Annotated[str, Field(max_length=MAX_TEXT)]
 Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Share = Annotated[float, Field(ge=-1e-9, le=1 + 1e-9)]

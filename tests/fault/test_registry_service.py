@@ -25,8 +25,10 @@ from deixis_schemas.messages import (
     CameraInfo,
     Gestures,
     HeadPoses,
+    Health,
     Message,
     Poi,
+    RobotPose,
     State,
     Target,
     Track,
@@ -69,7 +71,7 @@ def _answers(endpoint: str) -> bool:
 class Bench:
     """A robot's keys with nothing but fusion on them; the test plays the other stages."""
 
-    def __init__(self, session: zenoh.Session, endpoint: str, robot: str, registry: Path) -> None:
+    def __init__(self, session: zenoh.Session, endpoint: str, robot: str, registry: Path | None) -> None:
         self.session = session
         self.endpoint = endpoint
         self.robot = robot
@@ -88,7 +90,7 @@ class Bench:
             heard.append(codec.decode(type_, sample.payload.to_bytes(), str(sample.encoding)))
 
     def command(self, *more: str) -> list[str]:
-        sets = ["--set", f"registry={self.registry}", *more]
+        sets = ["--set", f"registry={self.registry}", *more] if self.registry else [*more]
         return [sys.executable, "-c", "import sys; from deixis_fusion.service import main; sys.exit(main())",
                 "--robot", self.robot, "--connect", self.endpoint, *sets]  # fmt: skip
 
@@ -105,19 +107,22 @@ class Bench:
         selector = f"deixis/{self.robot}/{path}"
         return list(self.session.get(selector, payload=payload, encoding=encoding, timeout=5.0))
 
-    def ask(self, path: str, payload: dict[str, Any] | None = None) -> tuple[str, str]:
-        """("ok" or "refused", text) of the one reply to an edit."""
+    def ask(self, path: str, payload: dict[str, Any] | None = None) -> tuple[str, str] | None:
+        """("ok" or "refused", text) of the one reply to an edit; none where nobody answers on that key."""
         body = json.dumps(payload).encode() if payload is not None else None
-        (reply,) = self.replies(path, body, "application/json" if body else None)
+        replies = self.replies(path, body, "application/json" if body else None)
+        if not replies:
+            return None
+        (reply,) = replies
         if reply.ok is not None:
             return "ok", str(codec.decode_any(reply.ok.payload.to_bytes(), str(reply.ok.encoding)))
         assert reply.err is not None
         return "refused", reply.err.payload.to_string()
 
-    def state(self) -> State:
-        (reply,) = wait_until(lambda: self.replies("fusion/state"), "fusion's state")
+    def state(self, selector: str = "") -> State:
+        (reply,) = wait_until(lambda: self.replies(f"fusion/state{selector}"), "fusion's state")
         assert reply.ok is not None
-        return codec.decode(State, reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+        return codec.decode(State, reply.ok.payload.to_bytes(), str(reply.ok.encoding), max_bytes=topics.STATE.max_bytes)
 
     def put(self, topic: topics.Topic, message: Message) -> None:
         self.session.put(topic.key(self.robot), codec.encode(message), encoding=codec.encoding_of(type(message)))
@@ -139,28 +144,30 @@ def source(status: str, stage: str) -> Callable[[State], bool]:
 
 def camera_info(state: str = "streaming", last_seq: int = -1) -> CameraInfo:
     content = {"stamp_ns": 0, "stage": "camera", "instance": "c", "state": state, "source": "test", "width": 640, "height": 480}
+    content["run"] = 1
     return CameraInfo.model_validate(content | {"camera_matrix": K, "last_seq": last_seq})
 
 
-def of_frame(stage: str, seq: int) -> dict[str, Any]:
-    return {"seq": seq, "stamp_ns": 10**18 + seq * 33_333_333, "stage": stage, "instance": "x"}
+def of_frame(stage: str, seq: int, stamp_ns: int) -> dict[str, Any]:
+    return {"run": 1, "seq": seq, "stamp_ns": stamp_ns, "stage": stage, "instance": "x"}
 
 
 def face() -> Track:
     return Track.model_validate(
         {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
-        | {"bbox_px": (295, 210, 51, 60), "velocity_px_s": (0, 0)}
+        | {"bbox_px": (297, 210, 46, 60), "velocity_px_s": (0, 0)}
     )
 
 
 def show(bench: Bench, seq: int, *, head: bool = True) -> None:
     """One frame of a person who points left and looks there, 2 m ahead."""
-    bench.put(topics.TRACKS, Tracks(**of_frame("tracker", seq), width=640, height=480, tracks=[face()]))
+    now_ns = time.time_ns()
+    bench.put(topics.TRACKS, Tracks(**of_frame("tracker", seq, now_ns), width=640, height=480, tracks=[face()]))
     pose = {"person_id": 1, "status": "tracking", "yaw_deg": 60.0, "yaw_sigma_deg": 3.0}
     if head:
-        bench.put(topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq) | {"poses": [pose]}))
+        bench.put(topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq, now_ns) | {"poses": [pose]}))
     hand = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 10.0}
-    bench.put(topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq) | {"gestures": [hand]}))
+    bench.put(topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq, now_ns) | {"gestures": [hand]}))
     wait_until(lambda: bench.beliefs and bench.beliefs[-1].seq == seq, f"the belief of frame {seq}")
 
 
@@ -180,7 +187,7 @@ def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(ben
     assert bench.process.wait(10) == -signal.SIGKILL
     assert len(acknowledged) > 5
     bench.start()
-    stored = {poi.poi_id: poi.position_m[0] for poi in bench.state().pois}
+    stored = {poi.poi_id: poi.position_m[0] for poi in bench.state("?top=1024").pois}
     assert all(stored[poi_id] >= x for poi_id, x in acknowledged.items())
     assert sum(stored[poi_id] != x for poi_id, x in acknowledged.items()) <= 1
     assert bench.stop() == 0
@@ -188,23 +195,99 @@ def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(ben
 
 def test_edits_are_answered_or_refused_with_the_fields_name_and_seen_in_state(bench: Bench) -> None:
     bench.start()
-    assert bench.ask("fusion/poi/vase", {"position_m": [1, 2, 3]})[0] == "ok"
+    stored = bench.ask("fusion/poi/vase", {"position_m": [1, 2, 3]})
+    assert stored is not None
+    assert stored[0] == "ok"
     assert bench.ask("fusion/poi/vase", {"position_m": [1, 2, "x"]}) == (
         "refused", "position_m.2: Input should be a valid number, unable to parse string as a number",
     )  # fmt: skip
-    assert bench.ask("fusion/poi/ghost?op=delete")[1].startswith("poi_id: there is no POI 'ghost'")
+    assert bench.ask("fusion/poi/ghost?op=delete") == ("refused", "poi_id: there is no POI 'ghost'")
     bench.session.put(f"deixis/{bench.robot}/fusion/poi/door", b'{"position_m": [4, 5, 6]}')
     bench.session.put(f"deixis/{bench.robot}/fusion/poi/bad", b'{"position_m": 4}')
-    bench.session.put(f"deixis/{bench.robot}/fusion/poi/vase/../..", b"garbage")
-    wait_until(lambda: bench.state().edits_rejected >= 4, "four refused edits")
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi/x/fusion/poi/vase", b'{"position_m": [9, 9, 9]}')
+    assert bench.ask("fusion/poi/vase/x", {"position_m": [9, 9, 9]}) is None
+    wait_until(lambda: bench.state().edits_rejected >= 3, "three refused edits")
     state = bench.state()
-    assert [poi.poi_id for poi in state.pois] == ["door", "vase"]
+    assert [(poi.poi_id, poi.position_m) for poi in state.pois] == [("door", (4, 5, 6)), ("vase", (1, 2, 3))]
     assert any(edit.key.endswith("/bad") and edit.reason.startswith("position_m") for edit in state.rejected_edits)
     keys = sorted(str(r.ok.key_expr).rsplit("/", 1)[1] for r in bench.replies("fusion/poi/**?format=json") if r.ok is not None)
     assert keys == ["door", "vase"]
     bench.session.delete(f"deixis/{bench.robot}/fusion/poi/door")
     wait_until(lambda: [poi.poi_id for poi in bench.state().pois] == ["vase"], "the delete")
     assert bench.stop() == 0
+
+
+def test_every_edit_of_a_burst_is_stored_in_one_go(bench: Bench) -> None:
+    bench.start()
+    for i in range(300):
+        bench.session.put(f"deixis/{bench.robot}/fusion/poi/p{i}", json.dumps({"position_m": [i, 0, 0]}).encode())
+    wait_until(lambda: bench.state().edits_accepted + bench.state().edits_lost >= 300, "300 edits stored or counted")
+    state = bench.state("?top=1024")
+    assert (state.edits_accepted, state.edits_rejected, state.edits_lost, state.pois_total) == (300, 0, 0, 300)
+    assert len(bench.state().pois) == 16
+    assert len(bench.replies("fusion/poi/**")) == 300
+    assert bench.stop() == 0
+    bench.start()
+    assert bench.state().pois_total == 300
+
+
+def test_who_watches_the_pois_hears_each_edit_once(bench: Bench) -> None:
+    bench.start()
+    heard: list[tuple[str, str]] = []
+    watcher = bench.session.declare_subscriber(
+        f"deixis/{bench.robot}/fusion/poi/**",
+        lambda sample: heard.append((str(sample.key_expr).rsplit("/", 1)[1], str(sample.kind).rsplit(".", maxsplit=1)[-1])),
+    )
+    bench.ask("fusion/poi/vase", {"position_m": [1, 2, 3]})
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi/door", b'{"position_m": [4, 5, 6]}')
+    wait_until(lambda: bench.state().edits_accepted == 2, "the put")
+    bench.ask("fusion/poi/vase", {"position_m": [1, 2, "x"]})
+    bench.ask("fusion/poi/vase?op=delete")
+    wait_until(lambda: len(heard) >= 3, "three edits heard")
+    time.sleep(0.3)
+    assert heard == [("vase", "PUT"), ("door", "PUT"), ("vase", "DELETE")]
+    state = bench.state()
+    assert (state.edits_accepted, state.edits_rejected) == (3, 1)
+    watcher.undeclare()
+
+
+def test_the_state_answers_as_long_as_it_is_asked_for(bench: Bench) -> None:
+    bench.start()
+    for i in range(20):
+        bench.session.put(f"deixis/{bench.robot}/fusion/poi/p{i:02}", json.dumps({"position_m": [i, 0, 0]}).encode())
+    wait_until(lambda: bench.state().pois_total == 20, "20 POIs")
+    assert (len(bench.state().pois), len(bench.state("?top=20;format=msgpack").pois)) == (16, 20)
+    assert [poi.poi_id for poi in bench.state("?poi=p19").pois] == ["p19"]
+    assert bench.ask("fusion/state?top=0") == ("refused", "top: '0' is not a whole number from 1 to 1024")
+    assert bench.ask("fusion/state?poi=ghost") == ("refused", "poi: there is no POI 'ghost'")
+
+
+def test_an_old_pose_of_the_robot_is_said_in_state_and_health(bench: Bench) -> None:
+    bench.start()
+    bench.put(topics.CAMERA_INFO, camera_info())
+    content = {"stage": "robot", "instance": "r", "stamp_ns": time.time_ns(), "x_m": 0, "y_m": 0, "yaw_deg": 0}
+    bench.put(topics.ROBOT_POSE, RobotPose.model_validate(content))
+    wait_until(lambda: bench.state().robot_pose, "the robot's pose")
+    show(bench, 1)
+    assert source("ok", "robot")(bench.state())
+    bench.put(topics.ROBOT_POSE, RobotPose.model_validate(content | {"stamp_ns": time.time_ns() - 3 * 10**9}))
+    time.sleep(0.1)
+    show(bench, 2)
+    wait_until(lambda: source("late", "robot")(bench.state()), "an old pose in the state")
+    (reply,) = bench.replies("fusion/health")
+    assert reply.ok is not None
+    health = codec.decode(Health, reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+    assert any("s older than the frame" in note for note in health.notes)
+    assert bench.beliefs[-1].persons[0].evidence[2].source == "robot"
+
+
+def test_a_stage_that_is_killed_leaves_no_folder_behind(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    bench.registry = None
+    bench.start()
+    assert bench.state().registry_path == ":memory:"
+    bench.stop(signal.SIGKILL)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_two_stages_on_one_registry_file_the_second_exits_with_one_clear_error(bench: Bench) -> None:
@@ -223,6 +306,7 @@ def test_a_frame_is_answered_without_a_silent_stage_and_the_episode_ends_with_th
     bench.ask("fusion/poi/door", {"position_m": [1.0, 1.73, 1.3]})
     for seq in range(20):
         show(bench, seq)
+        time.sleep(0.02)
     assert bench.beliefs[-1].missing == []
     (person,) = bench.beliefs[-1].persons
     assert {e.source: (e.producer, e.status) for e in person.evidence} == {
@@ -260,7 +344,7 @@ def test_two_producers_on_one_key_are_noticed_and_said(bench: Bench) -> None:
     bench.start()
     for _ in range(3):
         for instance in ("one", "two"):
-            content = of_frame("headpose", 1) | {"instance": instance}
+            content = of_frame("headpose", 1, time.time_ns()) | {"instance": instance}
             bench.put(topics.HEAD_POSES, HeadPoses.model_validate(content))
     wait_until(lambda: any("2 producers" in s.reason for s in bench.state().sources), "two producers in the state")
     heads = next(s for s in bench.state().sources if s.stage == "headpose")
@@ -274,6 +358,8 @@ def test_the_site_file_gives_the_first_pois_and_a_bad_setting_is_named(bench: Be
     assert [poi.poi_id for poi in bench.state().pois] == ["vase"]
     assert isinstance(bench.state().pois[0], Poi)
     bench.stop()
-    bad = subprocess.run(bench.command("--set", "face_width_m=9"), capture_output=True, text=True, timeout=20, check=False)
+    bad = subprocess.run(
+        bench.command("--set", "hand.sigma_floor_deg=900"), capture_output=True, text=True, timeout=20, check=False
+    )
     assert bad.returncode == 78
-    assert "face_width_m" in bad.stderr
+    assert "hand.sigma_floor_deg" in bad.stderr

@@ -9,7 +9,6 @@ from deixis_fusion.belief import (
     BeliefAssignment,
     as_set,
     combine,
-    combine_all,
     everything_of,
     members,
     normalised,
@@ -56,8 +55,6 @@ def test_combination_is_associative_and_so_is_its_conflict(
 ) -> None:
     left, right = combine(combine(a, b).belief, c), combine(a, combine(b, c).belief)
     assert close(left.belief, right.belief, 1e-7)
-    one, other = combine_all([a, b, c]), combine_all([c, a, b])
-    assert math.isclose(one.conflict, other.conflict, abs_tol=1e-9)
 
 
 @given(assignments())
@@ -121,8 +118,6 @@ def test_total_conflict_is_vacuous_and_flagged_never_nan() -> None:
     combined = combine(BeliefAssignment(2, {0b01: 1.0}), BeliefAssignment(2, {0b10: 1.0}))
     assert combined.conflict == 1.0
     assert combined.belief.unknown == 1.0
-    three = combine_all([BeliefAssignment(2, {0b01: 1.0}), BeliefAssignment(2, {0b10: 1.0}), vacuous(2)])
-    assert (three.conflict, three.belief.unknown) == (1.0, 1.0)
 
 
 @given(st.sets(st.integers(0, 40)))

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.episodes import EpisodeTracker, Stroke
+from deixis_fusion.evidence import Sample, hand_over, head_over, weigh
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import RobotPlace
-from deixis_fusion.stroke import Sample, hand_over, head_over
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     Belief,
     CameraInfo,
@@ -23,6 +24,7 @@ from deixis_schemas.messages import (
     HeadPoses,
     Poi,
     Producer,
+    RobotPose,
     Target,
     Track,
     Tracks,
@@ -51,12 +53,16 @@ def pose(yaw: float | None, status: str = "tracking", **more: Any) -> HeadPose:
 REST = gesture("none", "idle")
 
 
+def sample(frame: int, hand: Gesture | None, head: HeadPose | None) -> Sample:
+    return Sample(stamp(frame), stamp(frame), hand, head)
+
+
 def follow(story: list[tuple[int, Gesture | None]]) -> list[Stroke]:
     """The episodes that come of (number of frames, gesture) in turn."""
-    tracker, ended, frame = EpisodeTracker(1, CONFIG), [], 0
+    tracker, ended, frame = EpisodeTracker(1, CONFIG.episodes), [], 0
     for count, shown in story:
         for _ in range(count):
-            ended.append(tracker.observe(Sample(stamp(frame), shown, pose(60))))
+            ended.append(tracker.observe(sample(frame, shown, pose(60))))
             frame += 1
     ended.append(tracker.finish())
     return [stroke for stroke in ended if stroke is not None]
@@ -64,7 +70,7 @@ def follow(story: list[tuple[int, Gesture | None]]) -> list[Stroke]:
 
 def test_one_stroke_is_one_episode() -> None:
     (stroke,) = follow([(10, REST), (45, gesture()), (20, REST)])
-    assert (stroke.started_ns, stroke.last_pointing_ns) == (stamp(10), stamp(54))
+    assert (stroke.first.stamp_ns, stroke.last.stamp_ns) == (stamp(10), stamp(54))
     assert len(stroke.samples) == 45
 
 
@@ -100,8 +106,8 @@ def test_a_stroke_that_is_mostly_an_open_hand_is_no_episode() -> None:
 
 def test_a_hand_that_swings_to_the_other_side_begins_another_episode() -> None:
     first, second = follow([(30, gesture("point_left")), (3, REST), (30, gesture("point_right")), (20, REST)])
-    assert {sample.pointing for sample in first.samples} == {"point_left"}
-    assert {sample.pointing for sample in second.samples} == {"point_right"}
+    assert {shown.pointing for shown in first.samples} == {"point_left"}
+    assert {shown.pointing for shown in second.samples} == {"point_right"}
 
 
 def test_a_flicker_of_the_other_side_does_not_split_an_episode() -> None:
@@ -114,23 +120,23 @@ def test_every_episode_has_an_id_of_its_own() -> None:
 
 
 def test_evidence_is_bounded_however_long_the_hand_is_held() -> None:
-    tracker = EpisodeTracker(1, CONFIG)
+    tracker = EpisodeTracker(1, CONFIG.episodes)
     for frame in range(3000):
-        tracker.observe(Sample(stamp(frame), gesture(), None))
+        tracker.observe(sample(frame, gesture(), None))
     assert tracker.stroke is not None
-    assert len(tracker.stroke.samples) <= CONFIG.max_evidence_s * FPS + 2
+    assert len(tracker.stroke.samples) <= CONFIG.episodes.max_evidence_s * FPS + 2
 
 
 # --- evidence of a stroke ---------------------------------------------------------------------------------------------
 
 
 def samples(hands: Sequence[Gesture | None], heads: Sequence[HeadPose | None]) -> list[Sample]:
-    return [Sample(stamp(i), hand, head) for i, (hand, head) in enumerate(zip(hands, heads, strict=True))]
+    return [sample(i, hand, head) for i, (hand, head) in enumerate(zip(hands, heads, strict=True))]
 
 
 def test_more_frames_do_not_make_a_stroke_more_certain() -> None:
-    short = head_over(samples([gesture()] * 20, [pose(60)] * 20), 0.2)
-    long = head_over(samples([gesture()] * 200, [pose(60)] * 200), 0.2)
+    short = head_over(weigh(samples([gesture()] * 20, [pose(60)] * 20), 0.2))
+    long = head_over(weigh(samples([gesture()] * 200, [pose(60)] * 200), 0.2))
     assert short == long
     assert short is not None
     assert short.yaw_sigma_deg == pytest.approx(3.0)
@@ -138,36 +144,36 @@ def test_more_frames_do_not_make_a_stroke_more_certain() -> None:
 
 def test_the_head_on_its_way_and_outliers_hardly_count() -> None:
     yaws = [10, 20, 30, 40, 50] + [60.0] * 20 + [-150.0] * 3
-    head = head_over(samples([gesture()] * 28, [pose(yaw) for yaw in yaws]), 0.2)
+    head = head_over(weigh(samples([gesture()] * 28, [pose(yaw) for yaw in yaws]), 0.2))
     assert head is not None
     assert head.yaw_deg == pytest.approx(60)
 
 
 def test_a_head_mostly_out_of_range_is_out_of_range_to_its_side() -> None:
     heads = [pose(90)] * 8 + [pose(None, "out_of_range", side="left")] * 20
-    head = head_over(samples([gesture()] * 28, heads), 0.2)
+    head = head_over(weigh(samples([gesture()] * 28, heads), 0.2))
     assert head is not None
     assert (head.yaw_deg, head.side) == (None, "left")
 
 
 @pytest.mark.parametrize("shown", [None, pose(None, "lost"), pose(None, "initialising")])
 def test_a_head_that_was_not_tracked_says_nothing(shown: HeadPose | None) -> None:
-    assert head_over(samples([gesture()] * 30, [shown] * 30), 0.2) is None
+    assert head_over(weigh(samples([gesture()] * 30, [shown] * 30), 0.2)) is None
 
 
 def test_the_hand_goes_by_the_vote_and_a_finger_seen_now_and_then_counts() -> None:
     kinds = ["point_left"] * 12 + ["invisible"] * 18
-    hand, side = hand_over(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0)
+    hand = hand_over(weigh(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0))
     assert hand is not None
-    assert (hand.gesture, side) == ("point_left", "left")
-    hand, _ = hand_over(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0)
+    assert (hand.gesture, hand.hand) == ("point_left", "left")
+    hand = hand_over(weigh(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0))
     assert hand is not None
     assert hand.gesture == "invisible"
 
 
 def test_mirrored_bearings_are_taken_from_the_front_whichever_was_named() -> None:
     told = [gesture(bearing_deg=b, bearing_sigma_deg=10, bearing_mirrored=True) for b in [50.0, 130.0, 52.0, 128.0, 51.0]]
-    hand, _ = hand_over(samples([*told], [None] * 5), 0.0)
+    hand = hand_over(weigh(samples([*told], [None] * 5), 0.0))
     assert hand is not None
     assert hand.bearing_deg == pytest.approx(51, abs=1)
     assert hand.mirrored
@@ -191,11 +197,11 @@ class Scene:
             "height": 480,
         }
         self.fusion.set_camera(CameraInfo.model_validate(content | {"camera_matrix": K}))
-        self.fusion.set_robot(robot)
+        self.fusion.start_robot_at(robot)
         self.robot = robot
         self.pois = [self.poi(poi_id, bearing) for poi_id, bearing in BEARINGS.items()]
         self.fusion.set_pois(self.pois)
-        self.frame = 0
+        self.frame, self.run, self.shift_ns = 0, 1, 0
         self.beliefs: list[Belief] = []
         self.targets: list[Target] = []
 
@@ -219,8 +225,9 @@ class Scene:
     ) -> None:
         """So many frames of this."""
         for _ in range(count):
-            about: dict[str, Any] = {"seq": self.frame, "stamp_ns": stamp(self.frame), "instance": "x"}
-            width = 560 * CONFIG.face_width_m / 2
+            about: dict[str, Any] = {"run": self.run, "seq": self.frame, "stamp_ns": stamp(self.frame) + self.shift_ns}
+            about["instance"] = "x"
+            width = 560 * FACE_WIDTH_M / 2
             face = Track.model_validate(
                 {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
                 | {"bbox_px": (320 - width / 2, 215, width, 60), "velocity_px_s": (0, 0)}
@@ -229,7 +236,7 @@ class Scene:
             poses = HeadPoses(**about, stage="headpose", poses=[head] if head else [])
             gestures = Gestures(**about, stage="gesture", gestures=[hand] if hand else [])
             frame = JoinedFrame(
-                tracks=tracks,
+                tracks=None if "tracker" in without else tracks,
                 poses=None if "headpose" in without else poses,
                 gestures=None if "gesture" in without else gestures,
                 missing=without,
@@ -410,7 +417,7 @@ def test_updates_come_on_change_and_at_a_bounded_rate() -> None:
     updates = [target for target in scene.targets if not target.final]
     assert 1 <= len(updates) <= 5
     gaps = [b.stamp_ns - a.stamp_ns for a, b in itertools.pairwise(updates)]
-    assert all(gap >= CONFIG.update_every_s * 1e9 for gap in gaps)
+    assert all(gap >= CONFIG.answer.update_every_s * 1e9 for gap in gaps)
 
 
 def test_ages_and_latency_are_told_where_time_runs() -> None:
@@ -442,3 +449,81 @@ def test_masses_of_every_source_are_shown_and_sum_to_one() -> None:
     point(scene, 60)
     for said in scene.finals[0].evidence:
         assert sum(focal.mass for focal in said.masses) == pytest.approx(1.0)
+
+
+# --- runs and clocks --------------------------------------------------------------------------------------------------
+
+
+def test_a_clock_set_back_by_forty_milliseconds_neither_ends_nor_prolongs_an_episode() -> None:
+    steady, stepped = Scene(), Scene()
+    for scene in (steady, stepped):
+        scene.show(15, REST, pose(0))
+        scene.show(40, gesture(bearing_deg=60, bearing_sigma_deg=10), pose(60))
+        scene.show(4, REST, pose(0))
+        scene.shift_ns = -40_000_000 if scene is stepped else 0
+        scene.show(4, REST, pose(0))
+        assert scene.finals == []
+        scene.show(4, REST, pose(0))
+    (before,), (after,) = steady.finals, stepped.finals
+    assert (after.seq, after.poi_ids, after.started_ns, after.ended_ns) == (before.seq, ["g"], stamp(15), stamp(54))
+    assert after.stamp_ns == before.stamp_ns - 40_000_000
+
+
+def test_a_clock_set_back_by_an_hour_does_not_keep_a_place_for_an_hour() -> None:
+    scene = Scene()
+    scene.show(5, REST, pose(0))
+    scene.shift_ns = -(10**12)
+    scene.show(5, REST, pose(0))
+    assert scene.beliefs[-1].persons[0].position_m is not None
+    scene.show(70, None, None, person=False)
+    scene.show(1, None, None, without=("tracker",))
+    assert scene.fusion.persons == []
+
+
+def test_a_new_run_ends_the_episodes_of_the_last_and_forgets_its_persons() -> None:
+    scene = Scene()
+    scene.show(30, gesture(bearing_deg=60, bearing_sigma_deg=10), pose(60))
+    (episode_id,) = scene.fusion.open_episodes()
+    scene.run, scene.frame = 2, 0
+    scene.show(1, gesture(), pose(60))
+    (final,) = scene.finals
+    assert (final.episode_id, final.poi_ids, final.frame_id) == (episode_id, ["g"], (1, 29))
+    assert scene.beliefs[-1].frame_id == (2, 0)
+    assert scene.beliefs[-1].persons[0].episode_id is None
+    assert scene.fusion.open_episodes() == []
+
+
+def test_the_robots_pose_is_that_of_the_frames_stamp() -> None:
+    scene = Scene()
+    for i in range(10):
+        turned = {"x_m": 0, "y_m": 0, "yaw_deg": math.degrees(0.1 * i)}
+        about = {"stage": "robot", "instance": "r", "stamp_ns": stamp(0) + i * 10**8}
+        scene.fusion.hear_robot(RobotPose.model_validate(about | turned))
+    scene.show(1, REST, pose(0))
+    (person,) = scene.beliefs[-1].persons
+    assert person.position_m is not None
+    assert person.position_m[:2] == pytest.approx((2, 0), abs=0.02)
+    assert [said.source for said in person.evidence] == ["gesture", "headpose"]
+
+
+def test_an_old_pose_of_the_robot_is_used_and_said_in_evidence_and_reason() -> None:
+    scene = Scene()
+    about = {"stage": "robot", "instance": "r", "stamp_ns": stamp(0) - 3 * 10**9}
+    scene.fusion.hear_robot(RobotPose.model_validate(about | {"x_m": 0, "y_m": 0, "yaw_deg": 0}))
+    point(scene, 60)
+    (final,) = scene.finals
+    assert final.poi_ids == ["g"]
+    assert final.evidence[2].source == "robot"
+    assert (final.evidence[2].status, final.evidence[2].weight) == ("late", 0)
+    assert "s older than the frame" in final.evidence[2].observed
+    assert "robot/pose is in doubt" in final.reason
+    assert "s older than the frame" in scene.fusion.robot_doubt
+
+
+def test_the_mirror_of_minus_sixty_is_minus_one_hundred_and_twenty() -> None:
+    scene = Scene()
+    hand = gesture("point_right", bearing_deg=-60, bearing_sigma_deg=10, bearing_mirrored=True)
+    scene.show(30, hand, pose(-60))
+    (final,) = scene.fusion.end(None)
+    assert final.evidence[0].observed == "point_right, bearing -60.0 or -120.0 +- 10.0 deg"
+    assert "(about -60 or -120 +- 10 deg)" in final.reason

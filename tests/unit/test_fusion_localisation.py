@@ -9,20 +9,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from deixis_fusion.discernment import candidates
+from deixis_fusion.config import PlaceConfig
 from deixis_fusion.localisation import (
+    Camera,
     DistanceFilter,
     HeadSighting,
+    PersonLocator,
     PersonPlace,
     RobotPlace,
     bearing_deg,
-    bearing_sigma_deg,
+    bearing_with_sigma_deg,
     depth_of_face,
     locate,
-    viewing_ray,
+    to_base,
 )
-from deixis_fusion.visibility import sees
-from deixis_schemas.messages import CameraInfo, CameraMount, Poi
+from deixis_fusion.visibility import frame_of_discernment, sees
+from deixis_runtime.lens import LensError
+from deixis_schemas.anatomy import FACE_WIDTH_M
+from deixis_schemas.messages import CameraInfo, CameraMount, Poi, Track
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,7 +37,7 @@ angles = st.floats(-179, 179)
 metres = st.floats(-20, 20)
 
 
-def camera(**changes: Any) -> CameraInfo:
+def camera_info(**changes: Any) -> CameraInfo:
     content = {
         "stamp_ns": 0,
         "stage": "camera",
@@ -44,6 +48,10 @@ def camera(**changes: Any) -> CameraInfo:
         "height": 480,
     }
     return CameraInfo.model_validate(content | {"camera_matrix": K} | changes)
+
+
+def camera(**changes: Any) -> Camera:
+    return Camera.of(camera_info(**changes))
 
 
 def place(x: float, y: float) -> PersonPlace:
@@ -79,39 +87,69 @@ def test_a_camera_that_is_turned_and_tilted_sees_what_lies_ahead_of_it() -> None
     assert found.position_m == pytest.approx((1.0, 1.0 + math.sqrt(2), 1.0 + math.sqrt(2)))
 
 
+def rotation(axis: int, degrees: float) -> np.ndarray:
+    """The matrix of a turn about an axis of a right-handed frame."""
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    matrix = np.eye(3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    matrix[first, first] = matrix[second, second] = cos
+    matrix[first, second], matrix[second, first] = -sin, sin
+    return matrix
+
+
+@given(angles, angles, angles, st.tuples(metres, metres, metres))
+def test_the_mount_turns_as_rotation_matrices_do(
+    roll: float, pitch_up: float, yaw: float, optical: tuple[float, float, float]
+) -> None:
+    # REP-103: x forward, y left, z up; right-handed about x is clockwise seen from behind, about y is down.
+    turn = rotation(2, yaw) @ rotation(1, -pitch_up) @ rotation(0, roll)
+    expected = turn @ np.array([optical[2], -optical[0], -optical[1]])
+    found = to_base(optical, CameraMount(roll_deg=roll, pitch_up_deg=pitch_up, yaw_deg=yaw))
+    assert found == pytest.approx(tuple(expected), abs=1e-9)
+
+
+def test_a_camera_rolled_clockwise_sees_what_is_above_on_the_left_of_its_picture() -> None:
+    _, left, up = to_base((-1.0, 0.0, 0.0), CameraMount(roll_deg=90))
+    assert (left, up) == pytest.approx((0, 1))
+
+
 def test_the_distance_of_a_face_scales_with_the_picture() -> None:
-    assert depth_of_face(camera(), 50.96, 640, 0.182) == pytest.approx(2.0)
-    assert depth_of_face(camera(), 25.48, 320, 0.182) == pytest.approx(2.0)
-    with pytest.raises(ValueError, match="width_px"):
-        depth_of_face(camera(), 0, 640, 0.182)
+    lens = camera().lens
+    assert depth_of_face(lens, 280 * FACE_WIDTH_M, (640, 480)) == pytest.approx(2.0)
+    assert depth_of_face(lens, 140 * FACE_WIDTH_M, (320, 240)) == pytest.approx(2.0)
 
 
-def test_without_intrinsics_nobody_is_placed() -> None:
-    with pytest.raises(ValueError, match="camera_matrix"):
-        depth_of_face(camera(camera_matrix=None), 50, 640, 0.182)
+@pytest.mark.parametrize("matrix", [None, (0.0, *K[1:]), (-560.0, *K[1:]), (*K[:4], 1e-300, *K[5:]), (1e300, *K[1:])])
+def test_a_camera_without_intrinsics_that_can_be_places_nobody(matrix: tuple[float, ...] | None) -> None:
+    with pytest.raises(LensError, match="camera_matrix"):
+        Camera.of(camera_info(camera_matrix=matrix))
 
 
-@pytest.mark.parametrize(
-    ("model", "coefficients"),
-    [
-        ("plumb_bob", [-0.28, 0.09, 0.001, -0.0005, 0.0]),
-        ("rational_polynomial", [0.1, -0.05, 0.0005, 0.0002, 0.01, 0.12, -0.03, 0.005]),
-        ("equidistant", [0.02, -0.005, 0.001, 0.0]),
-    ],
-)
-def test_distortion_is_taken_back_as_opencv_does(model: str, coefficients: list[float]) -> None:
-    import cv2
+def face(width: float) -> Track:
+    return Track.model_validate(
+        {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
+        | {"bbox_px": (320 - width / 2, 215, width, 60), "velocity_px_s": (0, 0)}
+    )
 
-    matrix, lens = np.array(K).reshape(3, 3), np.array(coefficients)
-    for pixel in [(40.0, 30.0), (319.5, 239.5), (600.0, 400.0)]:
-        points = np.array([[pixel]])
-        theirs = (cv2.fisheye if model == "equidistant" else cv2).undistortPoints(points, matrix, lens)
-        ours = viewing_ray(camera(distortion_model=model, distortion=coefficients), pixel, (640, 480))
-        assert ours == pytest.approx(tuple(theirs.ravel()), abs=2e-3)
+
+def test_a_place_beyond_what_a_message_can_say_is_none() -> None:
+    locator = PersonLocator(PlaceConfig())
+    locator.see(face(46), (640, 480), None, (camera(), RobotPlace(99_999.0, 0, 0)), 0)
+    assert locator.place is None
+    locator.see(face(46), (640, 480), None, (camera(), RobotPlace()), 1)
+    assert locator.place is not None
+
+
+def test_a_place_is_held_for_a_while_when_the_face_is_not_seen() -> None:
+    locator = PersonLocator(PlaceConfig())
+    locator.see(face(46), (640, 480), None, (camera(), RobotPlace()), 0)
+    for seconds, held in ((1.9, True), (2.1, False)):
+        locator.see(None, (640, 480), None, (camera(), RobotPlace()), int(seconds * 1e9))
+        assert (locator.place is not None) is held
 
 
 def test_an_uncertain_distance_blurs_what_lies_to_the_side_and_not_what_lies_ahead() -> None:
-    beside, ahead = bearing_sigma_deg(place(2, 0), (2, -1, 1), 0.0), bearing_sigma_deg(place(2, 0), (1, 0, 1), 0.0)
+    (_, beside), (_, ahead) = (bearing_with_sigma_deg(place(2, 0), target, 0.0) for target in ((2, -1, 1), (1, 0, 1)))
     assert beside == pytest.approx(math.degrees(math.atan(0.1)), rel=0.01)
     assert ahead == pytest.approx(0, abs=1e-6)
 
@@ -152,13 +190,13 @@ def test_sight_is_mutual(ax: float, ay: float, bx: float, by: float) -> None:
     assert sees((ax, ay), (bx, by), [WALL], 0.0) == sees((bx, by), (ax, ay), [WALL], 0.0)
 
 
-def test_the_frame_of_discernment_holds_the_visible_pois_by_id() -> None:
+def test_the_frame_of_discernment_holds_the_visible_pois_in_their_order() -> None:
     pois = [
-        Poi(poi_id="b", position_m=(2.5, 0, 1)),
         Poi(poi_id="a", position_m=(0, 2, 1)),
+        Poi(poi_id="b", position_m=(2.5, 0, 1)),
         Poi(poi_id="c", position_m=(0, 1, 1)),
     ]
-    found = candidates(place(0.5, 0), pois, [WALL], 0.15)
+    found = frame_of_discernment(place(0.5, 0), pois, [WALL], 0.15)
     assert [candidate.poi.poi_id for candidate in found] == ["a", "c"]
 
 
@@ -173,7 +211,7 @@ def load_truth(name: str) -> dict[str, Any]:
     return content
 
 
-def camera_of(truth: dict[str, Any]) -> tuple[CameraInfo, np.ndarray]:
+def camera_of(truth: dict[str, Any]) -> tuple[Camera, np.ndarray]:
     given_camera = truth["meta"]["camera"]
     rotation = np.array(given_camera["R_world_to_cam"], float).reshape(3, 3)
     centre = -rotation.T @ np.array(given_camera["t_world_to_cam"])

@@ -8,16 +8,15 @@ from typing import Any
 
 import msgpack
 import pytest
-from deixis_fusion.edits import EditError, matches, poi_id_of, read_poi
-from deixis_fusion.poi_edits import PoiEdits
-from deixis_fusion.registry import Registry, RegistryError
-from deixis_fusion.registry_path import default_registry_path
+from deixis_fusion.poi_edits import EditError, PoiEdits, poi_id_of, read_poi
+from deixis_fusion.registry import Delete, Put, Registry, RegistryError, default_path
 from deixis_runtime.queries import Edit, Query, Refused
 from deixis_runtime.site import SitePoi
 from deixis_schemas.codec import encode, encoding_of
 from deixis_schemas.messages import MAX_POIS, Poi
 
-KEY = "deixis/r1/fusion/poi/vase"
+PREFIX = "deixis/r1/fusion/poi/"
+KEY = PREFIX + "vase"
 POI_LABEL = encoding_of(Poi)
 
 
@@ -96,11 +95,56 @@ def test_a_failed_write_leaves_memory_as_the_disk_is(path: Path) -> None:
 
 def test_the_default_file_depends_on_robot_and_site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    one = default_registry_path("r1", Path("sites/lab.yaml"))
+    one = default_path("r1", Path("sites/lab.yaml"))
     assert one.parent == tmp_path / "deixis" / "r1"
     assert one.name.startswith("lab-")
-    assert len({one, default_registry_path("r2", Path("sites/lab.yaml")), default_registry_path("r1", Path("lab.yaml"))}) == 3
-    assert one == default_registry_path("r1", Path("sites/../sites/lab.yaml"))
+    assert len({one, default_path("r2", Path("sites/lab.yaml")), default_path("r1", Path("lab.yaml"))}) == 3
+    assert one == default_path("r1", Path("sites/../sites/lab.yaml"))
+
+
+@pytest.mark.parametrize("robot", ["..", ".", "", "a/b", "-x", "r1\n"])
+def test_a_robots_name_never_leads_out_of_the_folder_of_the_registries(robot: str) -> None:
+    with pytest.raises(RegistryError, match="the robot's name"):
+        default_path(robot, Path("lab.yaml"))
+
+
+def test_without_a_file_the_registry_is_in_memory_and_leaves_nothing_behind(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    registry = Registry(None)
+    registry.apply_site(site(a=1))
+    registry.put(poi("b", 2))
+    assert places(registry) == {"a": 1, "b": 2}
+    registry.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_many_changes_are_one_transaction_and_each_is_refused_on_its_own(path: Path) -> None:
+    registry = Registry(path)
+    statements: list[str] = []
+    registry._db.set_trace_callback(statements.append)
+    results = registry.apply(
+        [*(Put(poi(f"p{i}", i)) for i in range(300)), Delete("ghost"), Delete("p7"), Delete("p7"), Put(poi("p8", -1))]
+    )
+    assert [type(result) for result in results[300:]] == [RegistryError, Poi, RegistryError, Poi]
+    assert statements.count("COMMIT") == 1
+    registry.close()
+    stored = places(Registry(path))
+    assert (len(stored), stored["p8"], "p7" in stored) == (299, -1, False)
+
+
+def test_a_full_registry_takes_what_fits_of_many_changes(path: Path) -> None:
+    registry = Registry(path)
+    results = registry.apply([Put(poi(f"p{i}")) for i in range(MAX_POIS + 3)])
+    assert [isinstance(result, RegistryError) for result in results] == [False] * MAX_POIS + [True] * 3
+
+
+def test_where_the_disk_refuses_all_changes_of_a_transaction_are_refused(path: Path) -> None:
+    registry = Registry(path)
+    registry._db.execute("PRAGMA query_only = ON")
+    assert all(isinstance(result, RegistryError) for result in registry.apply([Put(poi("a")), Delete("ghost")]))
+    assert places(registry) == {}
 
 
 # --- edits ------------------------------------------------------------------------------------------------------------
@@ -108,12 +152,12 @@ def test_the_default_file_depends_on_robot_and_site(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("label", ["application/json", "", "zenoh/bytes", "zenoh/string", "text/json"])
 def test_a_poi_is_read_from_json_as_generic_clients_send_it(label: str) -> None:
-    assert read_poi(KEY, b'{"position_m": [1, 2, 3]}', label) == Poi(poi_id="vase", position_m=(1, 2, 3))
+    assert read_poi("vase", b'{"position_m": [1, 2, 3]}', label) == Poi(poi_id="vase", position_m=(1, 2, 3))
 
 
 def test_a_poi_is_read_from_msgpack() -> None:
     wanted = Poi(poi_id="vase", position_m=(1, 2, 3), tags=["x"])
-    assert read_poi(KEY, encode(wanted), POI_LABEL) == wanted
+    assert read_poi("vase", encode(wanted), POI_LABEL) == wanted
 
 
 @pytest.mark.parametrize(
@@ -138,44 +182,41 @@ def test_a_poi_is_read_from_msgpack() -> None:
 )
 def test_a_malformed_poi_is_refused_with_the_fields_name(payload: bytes, label: str, complaint: str) -> None:
     with pytest.raises(EditError, match=complaint):
-        read_poi(KEY, payload, label)
+        read_poi("vase", payload, label)
 
 
 @pytest.mark.parametrize(
-    "key", ["deixis/r1/fusion/poi/*", "deixis/r1/fusion/poi/**", "deixis/r1/fusion/poi/", "fusion/state", "a/$*"]
-)
-def test_an_edit_needs_the_key_of_one_poi(key: str) -> None:
-    with pytest.raises(EditError, match="key: "):
-        poi_id_of(key)
-
-
-@pytest.mark.parametrize("key", ["deixis/r1/fusion/poi/two words", "deixis/r1/fusion/poi/" + "x" * 65])
-def test_an_id_that_the_contract_refuses_is_refused(key: str) -> None:
-    with pytest.raises(EditError, match=r"^poi_id"):
-        read_poi(key, b'{"position_m": [1, 2, 3]}', "")
-
-
-@pytest.mark.parametrize(
-    ("expression", "expected"),
+    "key",
     [
-        (KEY, True), ("deixis/r1/fusion/poi/*", True), ("deixis/r1/fusion/poi/**", True), ("deixis/**", True), ("**", True),
-        ("deixis/*/fusion/poi/vase", True), ("deixis/**/vase", True), ("**/poi/*", True), ("deixis/r1/fusion/poi/v$*", True),
-        ("deixis/r1/fusion/poi/$*as$*", True), ("deixis/r1/fusion/poi/v$*x", False), ("deixis/r1/fusion/poi/vas$*sse", False),
-        ("deixis/r1/fusion/poi", False), ("deixis/r1/fusion/*", False), ("deixis/r2/**", False),
+        "deixis/r1/fusion/poi/*", "deixis/r1/fusion/poi/**", "deixis/r1/fusion/poi/", "fusion/state", "a/$*",
+        "deixis/r1/fusion/poi/x/fusion/poi/vase", "deixis/r2/fusion/poi/vase", "deixis/*/fusion/poi/vase",
+        "x/deixis/r1/fusion/poi/vase", "deixis/r1/fusion/poi/vase/",
     ],
 )  # fmt: skip
-def test_key_expressions_match_as_zenohs_do(expression: str, expected: bool) -> None:
-    import zenoh
+def test_an_edit_needs_the_key_of_one_poi_of_this_robot(key: str) -> None:
+    with pytest.raises(EditError, match="key: "):
+        poi_id_of(PREFIX, key)
 
-    assert matches(expression, KEY) is expected
-    assert bool(zenoh.KeyExpr(expression).intersects(zenoh.KeyExpr(KEY))) is expected
+
+@pytest.mark.parametrize("poi_id", ["two words", "x" * 65, "..", "-x"])
+def test_an_id_that_the_contract_refuses_is_refused(poi_id: str) -> None:
+    with pytest.raises(EditError, match=r"^poi_id"):
+        read_poi(poi_id_of(PREFIX, PREFIX + poi_id), b'{"position_m": [1, 2, 3]}', "")
+
+
+Announced = list[tuple[str, Poi | None]]
 
 
 @pytest.fixture
-def edits(path: Path) -> PoiEdits:
+def announced() -> Announced:
+    return []
+
+
+@pytest.fixture
+def edits(path: Path, announced: Announced) -> PoiEdits:
     registry = Registry(path)
     registry.apply_site(site(vase=1, door=2))
-    return PoiEdits(registry, "deixis/r1/fusion/poi/")
+    return PoiEdits(registry, PREFIX, lambda poi_id, stored: announced.append((poi_id, stored)))
 
 
 def query(key: str = KEY, payload: dict[str, Any] | None = None, **parameters: str) -> Query:
@@ -186,15 +227,19 @@ def test_a_get_answers_each_matching_poi_under_its_own_key(edits: PoiEdits) -> N
     replies = edits.answer(query("deixis/r1/fusion/poi/**"), 0)
     assert [key for key, _ in replies] == ["deixis/r1/fusion/poi/door", KEY]
     assert [key for key, _ in edits.answer(query(KEY), 0)] == [KEY]
+    assert [key for key, _ in edits.answer(query("deixis/*/fusion/**/v$*"), 0)] == [KEY]
     assert edits.answer(query("deixis/r1/fusion/poi/ghost"), 0) == []
 
 
-def test_an_acknowledged_edit_is_answered_with_what_is_on_disk(edits: PoiEdits, path: Path) -> None:
+def test_an_acknowledged_edit_is_answered_and_announced_with_what_is_on_disk(
+    edits: PoiEdits, announced: Announced, path: Path
+) -> None:
     ((key, stored),) = edits.answer(query(payload={"position_m": [9, 8, 7]}), 0)
     assert (key, stored) == (KEY, Poi(poi_id="vase", position_m=(9, 8, 7)))
     ((_, deleted),) = edits.answer(query("deixis/r1/fusion/poi/door", op="delete"), 0)
     assert isinstance(deleted, Poi)
     assert deleted.poi_id == "door"
+    assert announced == [("vase", stored), ("door", None)]
     edits._registry.close()
     assert places(Registry(path)) == {"vase": 9}
     assert edits.accepted == 2
@@ -207,12 +252,15 @@ def test_an_acknowledged_edit_is_answered_with_what_is_on_disk(edits: PoiEdits, 
         (query(op="put"), "^payload"),
         (query("deixis/r1/fusion/poi/ghost", op="delete"), "^poi_id: there is no POI 'ghost'"),
         (query("deixis/r1/fusion/poi/*", op="delete"), "^key"),
+        (query("deixis/r1/fusion/poi/x/fusion/poi/vase", payload={"position_m": [1, 2, 3]}), "^key"),
     ],
 )
-def test_a_refused_edit_names_the_field_and_is_counted(edits: PoiEdits, asked: Query, complaint: str) -> None:
+def test_a_refused_edit_names_the_field_and_is_counted(
+    edits: PoiEdits, announced: Announced, asked: Query, complaint: str
+) -> None:
     with pytest.raises(Refused, match=complaint):
         edits.answer(asked, 5)
-    assert (edits.accepted, edits.rejected) == (0, 1)
+    assert (edits.accepted, edits.rejected, announced) == (0, 1, [])
     assert (edits.rejections[0].key, edits.rejections[0].stamp_ns) == (asked.key, 5)
 
 
@@ -221,17 +269,22 @@ def test_an_operation_that_is_not_known_is_refused(edits: PoiEdits) -> None:
         edits.answer(query(op="drop"), 0)
 
 
-def test_edits_without_an_answer_do_the_same_and_their_refusal_is_kept(edits: PoiEdits) -> None:
-    assert edits.take(Edit(KEY, "put", msgpack.packb({"position_m": [3, 3, 3]}), POI_LABEL), 0) is None
-    assert edits.take(Edit(KEY, "delete", b"", ""), 0) is None
-    refused = edits.take(Edit(KEY, "delete", b"", ""), 7)
-    assert refused == "poi_id: there is no POI 'vase'"
-    assert (edits.accepted, edits.rejected) == (2, 1)
-    assert edits.rejections[-1].reason == refused
+def test_edits_without_an_answer_do_the_same_and_their_refusals_are_kept(edits: PoiEdits, announced: Announced) -> None:
+    put = Edit(KEY, "put", msgpack.packb({"position_m": [3, 3, 3]}), POI_LABEL)
+    gone = Edit(KEY, "delete", b"", "")
+    refused = edits.take([put, gone, gone, Edit(KEY, "put", b"{}", "")], 7)
+    assert sorted(refused) == ["poi_id: there is no POI 'vase'", "position_m: Field required"]
+    assert (edits.accepted, edits.rejected) == (2, 2)
+    assert sorted(edit.reason for edit in edits.rejections) == sorted(refused)
+    assert announced == []
 
 
 def test_only_the_last_refusals_are_kept(edits: PoiEdits) -> None:
-    for i in range(100):
-        edits.take(Edit(f"deixis/r1/fusion/poi/g{i}", "delete", b"", ""), i)
+    edits.take([Edit(f"{PREFIX}g{i}", "delete", b"", "") for i in range(100)], 0)
     assert (edits.rejected, len(edits.rejections)) == (100, 16)
     assert edits.rejections[-1].key.endswith("g99")
+
+
+def test_a_key_of_any_length_can_be_refused(edits: PoiEdits) -> None:
+    edits.take([Edit(PREFIX + "x" * 9000, "put", b"{}", ""), Edit(PREFIX + "y" * 9000, "delete", b"", "")], 0)
+    assert [len(edit.key) for edit in edits.rejections] == [2000, 2000]

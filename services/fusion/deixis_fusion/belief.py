@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 # Below this, what the sources agree on is rounding noise, and eq. 14 would divide by it.
@@ -137,22 +137,6 @@ def combine(first: BeliefAssignment, second: BeliefAssignment) -> Combination:
     if agreement < TOTAL_CONFLICT:
         return Combination(vacuous(first.size), 1.0)
     return Combination(normalised(first.size, joint), min(1.0, max(0.0, 1.0 - agreement)))
-
-
-def combine_all(assignments: Sequence[BeliefAssignment]) -> Combination:
-    """Dempster's rule over any number of sources; the conflict is that of all of them together, 1 - product of K.
-
-    Raises ValueError for an empty sequence.
-    """
-    if not assignments:
-        raise ValueError("there is nothing to combine")
-    belief, agreement = assignments[0], 1.0
-    for other in assignments[1:]:
-        step = combine(belief, other)
-        belief, agreement = step.belief, agreement * (1.0 - step.conflict)
-        if agreement < TOTAL_CONFLICT:
-            return Combination(vacuous(belief.size), 1.0)
-    return Combination(belief, min(1.0, max(0.0, 1.0 - agreement)))
 
 
 def _intersections(first: Mapping[int, float], second: Mapping[int, float]) -> dict[int, float]:

@@ -1,4 +1,4 @@
-"""Settings of the fusion stage."""
+"""Settings of the fusion stage, in groups by what they are about: `--set fusion.hand.sigma_floor_deg=8`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,112 @@ from typing import Literal
 
 from deixis_runtime.settings import StageConfig
 from pydantic import Field, model_validator
+
+
+class JoiningConfig(StageConfig):
+    """When a frame is answered, and who is not waited for."""
+
+    age_limit_s: float = Field(default=0.3, gt=0, le=10, description="A frame is answered without stages that take longer.")
+    lockstep_age_limit_s: float = Field(
+        default=5.0, gt=0, le=60, description="The same in lockstep, where a slow machine must not change the answers."
+    )
+    dead_after_s: float = Field(default=1.5, gt=0, le=60, description="A silent stage without liveliness is dead after this.")
+    source_silent_s: float = Field(default=1.5, gt=0, le=60, description="Without frames for so long, open episodes are ended.")
+
+
+class PlaceConfig(StageConfig):
+    """Where persons and the robot are."""
+
+    distance_sigma: float = Field(default=0.06, ge=0, le=1, description="Relative standard deviation of the distance.")
+    distance_time_s: float = Field(default=0.7, ge=0, le=60, description="Time constant that smooths a person's distance.")
+    frontal_yaw_deg: float = Field(default=35, gt=0, le=180, description="Heads turned further give a poor face width.")
+    hold_s: float = Field(default=2.0, ge=0, le=60, description="How long a person's last position is used.")
+    wall_clearance_m: float = Field(default=0.15, ge=0, le=10, description="A POI this far behind a wall's face hangs on it.")
+    robot_pose_max_age_s: float = Field(
+        default=1.0, gt=0, le=3600, description="A robot's pose older than the frame by more is still used, and said to be old."
+    )
+
+
+class HandConfig(StageConfig):
+    """The `deixis` rules for the hand."""
+
+    min_deg: float = Field(default=25, ge=0, le=180, description="Least bearing at which a hand is recognised.")
+    max_deg: float = Field(default=150, ge=0, le=180, description="Largest bearing at which a hand is recognised.")
+    soft_deg: float = Field(default=15, gt=0, le=90, description="Width of the borders of that range.")
+    miss: float = Field(default=0.25, ge=0, le=1, description="Probability that a finger within that range is missed.")
+    refinement: float = Field(default=0.9, ge=0, le=1, description="Part of each region's mass given to its POIs.")
+    discount: float = Field(default=0.08, ge=0, le=1, description="Mass kept on the whole frame.")
+    sigma_floor_deg: float = Field(default=6, ge=0, le=90, description="Error of the hand's bearing at least.")
+    outlier: float = Field(default=0.15, gt=0, lt=1, description="Probability that the hand's bearing is nonsense.")
+
+    @model_validator(mode="after")
+    def _range_is_a_range(self) -> HandConfig:
+        if self.min_deg >= self.max_deg:
+            raise ValueError("max_deg: must be larger than min_deg")
+        return self
+
+
+class HeadConfig(StageConfig):
+    """The `deixis` rules for the head."""
+
+    range_deg: float = Field(default=95, gt=0, le=180, description="Yaw beyond which a head is out of range.")
+    range_soft_deg: float = Field(default=10, gt=0, le=90, description="Width of the border of that range.")
+    sigma_deg: float = Field(default=4, gt=0, le=90, description="How exactly people turn the head.")
+    gain_min: float = Field(default=0.65, gt=0, le=1.5, description="Smallest part of the way that heads turn.")
+    gain_max: float = Field(default=1.0, gt=0, le=1.5, description="Largest part of the way that heads turn.")
+    full_turn: float = Field(default=0.65, ge=0, le=1, description="Probability that a head turns the whole way.")
+    overshoot_deg: float = Field(default=2, ge=0, le=20, description="A whole turn goes this much too far.")
+    at_robot: float = Field(default=0.15, ge=0, lt=1, description="Probability of looking at the robot instead.")
+    outlier: float = Field(default=0.05, gt=0, lt=1, description="Probability that the yaw is nonsense.")
+    discount: float = Field(default=0.05, ge=0, le=1, description="Mass kept on the whole frame.")
+
+    @model_validator(mode="after")
+    def _gains_are_a_range(self) -> HeadConfig:
+        if self.gain_min >= self.gain_max:
+            raise ValueError("gain_max: must be larger than gain_min")
+        return self
+
+
+class PaperConfig(StageConfig):
+    """The `paper` rules, in the paper's symbols."""
+
+    phi_h_min_deg: float = Field(default=40, ge=0, le=180, description="Least bearing at which a hand is recognised.")
+    phi_h_max_deg: float = Field(default=140, ge=0, le=180, description="Largest bearing at which a hand is recognised.")
+    phi_f_max_deg: float = Field(default=120, gt=0, le=180, description="Largest yaw at which a head is recognised.")
+    head_sigma_deg: float = Field(default=10, gt=0, le=90, description="Stands for the confusions of fig. 6.")
+
+    @model_validator(mode="after")
+    def _range_is_a_range(self) -> PaperConfig:
+        if self.phi_h_min_deg >= self.phi_h_max_deg:
+            raise ValueError("phi_h_max_deg: must be larger than phi_h_min_deg")
+        return self
+
+
+class EpisodesConfig(StageConfig):
+    """What makes a pointing episode, and which of its frames count."""
+
+    min_stroke_s: float = Field(default=0.25, ge=0, le=10, description="Strokes shorter than this are no pointing.")
+    max_gap_s: float = Field(default=0.3, ge=0, le=10, description="A stroke that drops out for less goes on.")
+    settle_s: float = Field(default=0.2, ge=0, le=10, description="At first the head may still turn: less weight.")
+    max_unclear_s: float = Field(default=1.0, ge=0, le=10, description="A hand held on may be unclear for so long.")
+    swing_s: float = Field(
+        default=0.4, ge=0, le=10, description="A hand that points to the other side for so long starts anew."
+    )
+    max_evidence_age_s: float = Field(
+        default=0.5, gt=0, le=10, description="A late stage still counts in a stroke for so long."
+    )
+    max_evidence_s: float = Field(default=5, gt=0, le=600, description="Of a long stroke the last seconds count.")
+
+
+class AnswerConfig(StageConfig):
+    """When an answer is given, and how much of it is published."""
+
+    max_unknown: float = Field(default=0.9, gt=0, le=1, description="With more mass on the whole frame, abstain.")
+    tie_margin: float = Field(default=0.08, ge=0, le=1, description="deixis: pignistic differences below this are ties.")
+    max_ties: int = Field(default=3, ge=1, le=64, description="deixis: with more POIs tied, abstain.")
+    max_conflict: float = Field(default=0.97, gt=0, le=1, description="deixis: with more conflict, abstain.")
+    update_every_s: float = Field(default=0.2, ge=0, le=10, description="Updates of a target are at least this far apart.")
+    rows: int = Field(default=16, ge=1, le=64, description="How many POIs are told of in a message, the likeliest first.")
 
 
 class FusionConfig(StageConfig):
@@ -18,80 +124,10 @@ class FusionConfig(StageConfig):
     registry: str | None = Field(
         default=None, max_length=4096, description="SQLite file of the POIs; a default place if empty."
     )
-
-    # joining
-    age_limit_s: float = Field(default=0.3, gt=0, le=10, description="A frame is answered without stages that take longer.")
-    lockstep_age_limit_s: float = Field(
-        default=5.0, gt=0, le=60, description="The same in lockstep, where a slow machine must not change the answers."
-    )
-    dead_after_s: float = Field(default=1.5, gt=0, le=60, description="A silent stage without liveliness is dead after this.")
-
-    source_silent_s: float = Field(default=1.5, gt=0, le=60, description="Without frames for so long, open episodes are ended.")
-
-    # localisation
-    face_width_m: float = Field(default=0.182, gt=0.05, le=0.5, description="Width of a face, ear to ear, for its distance.")
-    distance_sigma: float = Field(default=0.06, ge=0, le=1, description="Relative standard deviation of the distance.")
-    distance_time_s: float = Field(default=0.7, ge=0, le=60, description="Time constant that smooths a person's distance.")
-    frontal_yaw_deg: float = Field(default=35, gt=0, le=180, description="Heads turned further give a poor face width.")
-    hold_position_s: float = Field(default=2.0, ge=0, le=60, description="How long a person's last position is used.")
-    wall_clearance_m: float = Field(default=0.15, ge=0, le=10, description="A POI this far behind a wall's face hangs on it.")
-
-    # hand, eq. 16 and table 1
-    phi_h_min_deg: float = Field(default=40, ge=0, le=180, description="paper: least bearing at which a hand is recognised.")
-    phi_h_max_deg: float = Field(default=140, ge=0, le=180, description="paper: largest bearing at which a hand is recognised.")
-    hand_min_deg: float = Field(default=25, ge=0, le=180, description="deixis: least bearing at which a hand is recognised.")
-    hand_max_deg: float = Field(default=150, ge=0, le=180, description="deixis: largest bearing at which a hand is recognised.")
-    hand_soft_deg: float = Field(default=15, gt=0, le=90, description="deixis: width of the borders of that range.")
-    hand_miss: float = Field(
-        default=0.25, ge=0, le=1, description="deixis: probability that a finger within that range is missed."
-    )
-    hand_refinement: float = Field(default=0.9, ge=0, le=1, description="deixis: part of each region's mass given to its POIs.")
-    hand_discount: float = Field(default=0.08, ge=0, le=1, description="deixis: mass kept on the whole frame.")
-    hand_sigma_floor_deg: float = Field(default=6, ge=0, le=90, description="deixis: error of the hand's bearing at least.")
-    hand_outlier: float = Field(
-        default=0.15, gt=0, lt=1, description="deixis: probability that the hand's bearing is nonsense."
-    )
-
-    # head, eq. 18
-    phi_f_max_deg: float = Field(default=120, gt=0, le=180, description="paper: largest yaw at which a head is recognised.")
-    paper_head_sigma_deg: float = Field(default=10, gt=0, le=90, description="paper: stands for the confusions of fig. 6.")
-    head_range_deg: float = Field(default=95, gt=0, le=180, description="deixis: yaw beyond which a head is out of range.")
-    head_range_soft_deg: float = Field(default=10, gt=0, le=90, description="deixis: width of the border of that range.")
-    head_sigma_deg: float = Field(default=4, gt=0, le=90, description="deixis: how exactly people turn the head.")
-    head_gain_min: float = Field(default=0.65, gt=0, le=1.5, description="deixis: smallest part of the way that heads turn.")
-    head_gain_max: float = Field(default=1.0, gt=0, le=1.5, description="deixis: largest part of the way that heads turn.")
-    head_full_turn: float = Field(default=0.65, ge=0, le=1, description="deixis: probability that a head turns the whole way.")
-    head_overshoot_deg: float = Field(default=2, ge=0, le=20, description="deixis: a whole turn goes this much too far.")
-    head_at_robot: float = Field(default=0.15, ge=0, lt=1, description="deixis: probability of looking at the robot instead.")
-    head_outlier: float = Field(default=0.05, gt=0, lt=1, description="deixis: probability that the yaw is nonsense.")
-    head_discount: float = Field(default=0.05, ge=0, le=1, description="deixis: mass kept on the whole frame.")
-
-    # episodes
-    min_stroke_s: float = Field(default=0.25, ge=0, le=10, description="Strokes shorter than this are no pointing.")
-    max_gap_s: float = Field(default=0.3, ge=0, le=10, description="A stroke that drops out for less goes on.")
-    settle_s: float = Field(default=0.2, ge=0, le=10, description="At first the head may still turn: less weight.")
-    max_unclear_s: float = Field(default=1.0, ge=0, le=10, description="A hand held on may be unclear for so long.")
-    swing_s: float = Field(
-        default=0.4, ge=0, le=10, description="A hand that points to the other side for so long starts anew."
-    )
-    update_every_s: float = Field(default=0.2, ge=0, le=10, description="Updates of a target are at least this far apart.")
-    max_evidence_age_s: float = Field(
-        default=0.5, gt=0, le=10, description="A late stage still counts in a stroke for so long."
-    )
-    max_evidence_s: float = Field(default=5, gt=0, le=600, description="Of a long stroke the last seconds count.")
-
-    # answer
-    tie_margin: float = Field(default=0.08, ge=0, le=1, description="deixis: pignistic differences below this are ties.")
-    max_ties: int = Field(default=3, ge=1, le=64, description="deixis: with more POIs tied, abstain.")
-    max_conflict: float = Field(default=0.97, gt=0, le=1, description="deixis: with more conflict, abstain.")
-    max_unknown: float = Field(default=0.9, gt=0, le=1, description="deixis: with more mass on the whole frame, abstain.")
-
-    @model_validator(mode="after")
-    def _ranges_are_ranges(self) -> FusionConfig:
-        if self.phi_h_min_deg >= self.phi_h_max_deg:
-            raise ValueError("phi_h_max_deg: must be larger than phi_h_min_deg")
-        if self.hand_min_deg >= self.hand_max_deg:
-            raise ValueError("hand_max_deg: must be larger than hand_min_deg")
-        if self.head_gain_min >= self.head_gain_max:
-            raise ValueError("head_gain_max: must be larger than head_gain_min")
-        return self
+    joining: JoiningConfig = Field(default_factory=JoiningConfig, description="Joining of what the stages say of a frame.")
+    place: PlaceConfig = Field(default_factory=PlaceConfig, description="Places of persons and of the robot.")
+    hand: HandConfig = Field(default_factory=HandConfig, description="deixis: the hand, beyond eq. 16.")
+    head: HeadConfig = Field(default_factory=HeadConfig, description="deixis: the head, beyond eq. 18.")
+    paper: PaperConfig = Field(default_factory=PaperConfig, description="paper: eqs 16 and 18.")
+    episodes: EpisodesConfig = Field(default_factory=EpisodesConfig, description="Pointing episodes.")
+    answer: AnswerConfig = Field(default_factory=AnswerConfig, description="The answer.")

@@ -1,7 +1,7 @@
 """Pointing episodes: from a stroke to its one final answer.
 
 An episode opens when a pointing stroke has lasted long enough, goes on through short drop-outs, and ends when the hand is
-withdrawn, the person is lost or the source ends.
+withdrawn, the person is lost or the source ends. Durations are counted in the time of `RunClock` (`Sample.at_ns`).
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from .config import FusionConfig
-from .stroke import Sample
+from .config import EpisodesConfig
+from .evidence import Sample
 
 
 @dataclass
 class Stroke:
-    """One stroke of one person; an episode once it `is_open`."""
+    """One stroke of one person; an episode once it `is_open`. `first` and `last` are its first and last pointing frames."""
 
-    started_ns: int
-    last_pointing_ns: int
-    last_held_ns: int
+    first: Sample
+    last: Sample
+    held_ns: int
     episode_id: str = ""
     samples: list[Sample] = field(default_factory=list)
     not_pointing: int = 0
@@ -32,9 +32,9 @@ class Stroke:
 
 
 class EpisodeTracker:
-    """Follows the strokes of one person, frame by frame. Times are stamps of frames, nanoseconds."""
+    """Follows the strokes of one person, frame by frame."""
 
-    def __init__(self, person_id: int, config: FusionConfig) -> None:
+    def __init__(self, person_id: int, config: EpisodesConfig) -> None:
         self._person_id = person_id
         self._config = config
         self._count = 0
@@ -48,10 +48,10 @@ class EpisodeTracker:
 
     def observe(self, sample: Sample) -> Stroke | None:
         """Take in the next frame. Returns the episode that it ended, for its final answer."""
-        ended = self._end_after_gap(sample.stamp_ns) or self._end_after_turn(sample)
+        ended = self._end_after_gap(sample.at_ns) or self._end_after_turn(sample)
         if sample.unclear and self.stroke is not None:
             # A hand still held up whose outline tells nothing for a while is the same gesture.
-            self.stroke.last_held_ns = sample.stamp_ns
+            self.stroke.held_ns = sample.at_ns
         if sample.pointing:
             self._extend(sample)
         elif sample.not_pointing and self.stroke is not None:
@@ -65,11 +65,11 @@ class EpisodeTracker:
         self.stroke, self._turn = None, []
         return episode
 
-    def _end_after_gap(self, stamp_ns: int) -> Stroke | None:
+    def _end_after_gap(self, now_ns: int) -> Stroke | None:
         if self.stroke is None:
             return None
-        gone = stamp_ns - self.stroke.last_held_ns > self._config.max_gap_s * 1e9
-        unclear = stamp_ns - self.stroke.last_pointing_ns > self._config.max_unclear_s * 1e9
+        gone = now_ns - self.stroke.held_ns > self._config.max_gap_s * 1e9
+        unclear = now_ns - self.stroke.last.at_ns > self._config.max_unclear_s * 1e9
         return self.finish() if gone or unclear else None
 
     def _end_after_turn(self, sample: Sample) -> Stroke | None:
@@ -79,13 +79,13 @@ class EpisodeTracker:
                 self._turn = []
             return None
         self._turn.append(sample)
-        if sample.stamp_ns - self._turn[0].stamp_ns < self._config.swing_s * 1e9:
+        if sample.at_ns - self._turn[0].at_ns < self._config.swing_s * 1e9:
             return None
         turn = self._turn[:-1]
         ended = self.open_episode
         if ended is not None:
-            ended.samples = [old for old in ended.samples if old.stamp_ns < turn[0].stamp_ns]
-            ended.last_pointing_ns = ended.samples[-1].stamp_ns if ended.samples else ended.started_ns
+            ended.samples = [old for old in ended.samples if old.at_ns < turn[0].at_ns] or [ended.first]
+            ended.last = ended.samples[-1]
         self.stroke, self._turn = None, []
         for old in turn:
             self._extend(old)
@@ -93,23 +93,23 @@ class EpisodeTracker:
 
     def _extend(self, sample: Sample) -> None:
         if self.stroke is None:
-            self.stroke = Stroke(sample.stamp_ns, sample.stamp_ns, sample.stamp_ns)
-        self.stroke.last_pointing_ns = self.stroke.last_held_ns = sample.stamp_ns
+            self.stroke = Stroke(sample, sample, sample.at_ns)
+        self.stroke.last, self.stroke.held_ns = sample, sample.at_ns
         self.stroke.samples.append(sample)
         self.stroke.sides[sample.pointing or ""] += 1
-        oldest_ns = sample.stamp_ns - self._config.max_evidence_s * 1e9
-        if self.stroke.samples[0].stamp_ns < oldest_ns:
-            self.stroke.samples = [kept for kept in self.stroke.samples if kept.stamp_ns >= oldest_ns]
+        oldest_ns = sample.at_ns - self._config.max_evidence_s * 1e9
+        if self.stroke.samples[0].at_ns < oldest_ns:
+            self.stroke.samples = [kept for kept in self.stroke.samples if kept.at_ns >= oldest_ns]
 
     def _open_if_long_enough(self) -> None:
         stroke = self.stroke
         if stroke is None or stroke.is_open:
             return
-        lasted_ns = stroke.last_pointing_ns - stroke.started_ns
+        lasted_ns = stroke.last.at_ns - stroke.first.at_ns
         if lasted_ns < self._config.min_stroke_s * 1e9 or stroke.not_pointing >= len(stroke.samples):
             return
         self._count += 1
-        stroke.episode_id = f"p{self._person_id}-{stroke.started_ns}-{self._count}"
+        stroke.episode_id = f"p{self._person_id}-{stroke.first.stamp_ns}-{self._count}"
 
 
 def _opposes(sample: Sample, stroke: Stroke) -> bool:

@@ -1,50 +1,75 @@
-"""What was observed, as basic belief assignments: the hand by eq. 16 and table 1, the head by eq. 18.
+"""The evidence on one person: from what the stages said of a frame or a stroke to an observation of the hand and of the head.
 
-Two sets of rules. `paper_*` are the paper's to the letter (with the corrections of its errata: eq. 16 sums over the actual
-gestures, the hand's range is 40 to 140 degrees). `hand_assignment` and `head_assignment` go beyond it: every POI is weighed by
-the likelihood of what was seen given its bearing, with a head that turns only part of the way, and part of the mass stays
-on the paper's sets and on the whole frame, so that one wrong source is never a total conflict.
-
-Bearings are degrees at the person, positive toward the person's own left.
+Consecutive frames show nearly the same picture, so their errors are the same: multiplying the masses of thirty frames would
+count one observation thirty times. Over a stroke gestures are put to the vote and angles to the median, with a sigma that
+does not shrink with the number of frames.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeVar
 
-from deixis_schemas.messages import Side
+from deixis_schemas.messages import Gesture, HeadPose, Side, SourceStatus
 
-from .belief import BeliefAssignment, as_set, everything_of, normalised, vacuous
-from .config import FusionConfig
-from .discernment import Candidate
+from .config import EpisodesConfig
+from .joining import GESTURE, HEADPOSE, JoinedFrame
+from .localisation import wrapped_deg
 
-Region = Literal["left", "center", "right"]
+T = TypeVar("T")
 PointingGesture = Literal["point_left", "invisible", "point_right"]
+StageStatus = tuple[SourceStatus, str]
 
-# Table 1: P(recognised gesture | region pointed to).
-TABLE_1: dict[PointingGesture, dict[Region, float]] = {
-    "point_left": {"left": 0.90, "center": 0.05, "right": 0.00},
-    "invisible": {"left": 0.10, "center": 0.90, "right": 0.10},
-    "point_right": {"left": 0.00, "center": 0.05, "right": 0.90},
-}
+POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
+UNSETTLED_WEIGHT = 0.2
+# A finger seen in this part of the frames is seen: at VGA it comes and goes with the outline.
+DIRECTED_SHARE = 0.3
+LEAST_HEAD_SHARE = 0.2
+# Median absolute deviation to standard deviation of a normal distribution.
+MAD_TO_SIGMA = 1.4826
+NO_ANSWER: StageStatus = ("late", "did not answer this frame in time")
+UNKNOWN_PERSON = "the stage does not follow this person"
 
-FULL_CIRCLE_DEG = 360.0
-GAIN_STEPS = 8
-LOOK_AT_ROBOT_SIGMA_DEG = 8.0
-# A side is told wrongly now and then; a zero would make that a total conflict.
-WRONG_SIDE = 0.02
-# Sine of the bearing within which, ahead and behind, left goes over into right.
-SIDE_BORDER = 0.1
-POSSIBILITY_LEVELS = 5
-LEAST_OUT_OF_RANGE = 0.05
+
+@dataclass(frozen=True)
+class Sample:
+    """One frame of one person: what gesture and headpose said of the person, none where they said nothing.
+
+    `at_ns` is the time of `RunClock`, for durations; `stamp_ns` is the frame's stamp, to be published.
+    """
+
+    at_ns: int
+    stamp_ns: int
+    gesture: Gesture | None
+    pose: HeadPose | None
+
+    @cached_property
+    def pointing(self) -> PointingGesture | None:
+        """The pointing gesture of a stroke; none in other phases and for other gestures."""
+        if self.gesture is None or self.gesture.phase != "stroke":
+            return None
+        return next((kind for kind in POINTING if kind == self.gesture.gesture), None)
+
+    @property
+    def unclear(self) -> bool:
+        """A stroke whose gesture could not be told."""
+        return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "none"
+
+    @property
+    def not_pointing(self) -> bool:
+        """A stroke of an open hand, a wave and the like."""
+        return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
+
+
+Weighed = Sequence[tuple[Sample, float]]
 
 
 @dataclass(frozen=True)
 class HandObservation:
-    """A pointing stroke: the gesture recognised and, where it could be told, the bearing pointed to.
+    """A pointing stroke: the gesture recognised and, where it could be told, the bearing pointed to and by which hand.
 
     `mirrored`: the bearing may as well be 180 - bearing. `agreement` is the share of the frames that said so.
     """
@@ -54,6 +79,12 @@ class HandObservation:
     bearing_sigma_deg: float | None = None
     mirrored: bool = False
     agreement: float = 1.0
+    hand: Side | None = None
+
+    @property
+    def mirror_deg(self) -> float | None:
+        """The other bearing that it may be; none where there is only one."""
+        return wrapped_deg(180.0 - self.bearing_deg) if self.mirrored and self.bearing_deg is not None else None
 
 
 @dataclass(frozen=True)
@@ -66,227 +97,200 @@ class HeadObservation:
     agreement: float = 1.0
 
 
-# --- the paper's rules ------------------------------------------------------------------------------------------------
+class Witness(NamedTuple):
+    """How one stage stands, its process, and in words what it observed or why nothing. `stamp_ns` is the time it speaks of."""
+
+    status: SourceStatus
+    observed: str
+    producer: str = ""
+    stamp_ns: int | None = None
 
 
-def region_of(bearing_deg: float, range_deg: tuple[float, float]) -> Region:
-    """The region of section 6.1 that a POI is in: within `range_deg` its pointing hand is recognised, as left or right."""
-    if range_deg[0] <= abs(bearing_deg) <= range_deg[1]:
-        return "left" if bearing_deg > 0 else "right"
-    return "center"
+class Evidence(NamedTuple):
+    """What hand and head of one person show, none where nothing can be told, and who says so."""
+
+    hand: HandObservation | None
+    gesture: Witness
+    head: HeadObservation | None
+    headpose: Witness
 
 
-def paper_hand_assignment(
-    gesture: PointingGesture, bearings_deg: Sequence[float], range_deg: tuple[float, float]
-) -> BeliefAssignment:
-    """Eq. 16: masses of the sets of POIs on the left, on the right and in the centre, given the recognised gesture.
-
-    P(G) is the share of the POIs within region G; `range_deg` is (phi_h-min, phi_h-max). Vacuous where the gesture is
-    impossible for every POI there is.
-    """
-    weights: dict[int, float] = {}
-    for region, hypotheses in _regions(bearings_deg, range_deg).items():
-        weights[as_set(hypotheses)] = TABLE_1[gesture][region] * len(hypotheses) / len(bearings_deg)
-    return normalised(len(bearings_deg), weights)
-
-
-def paper_face_assignment(likelihoods: Sequence[float], far: Sequence[bool] | None) -> BeliefAssignment:
-    """Eq. 18 with equal priors: mass of each POI proportional to P(observed | POI).
-
-    `far` is none for a computed orientation. For "not computed" it tells which POIs lie beyond the head's range: their
-    masses together are m_f-O, the mass of their set (eq. 17).
-    """
-    weights: dict[int, float] = {}
-    if far is None:
-        weights = {1 << i: likelihood for i, likelihood in enumerate(likelihoods)}
-        return normalised(len(likelihoods), weights)
-    near = [i for i, is_far in enumerate(far) if not is_far]
-    beyond = [i for i, is_far in enumerate(far) if is_far]
-    weights = {1 << i: likelihoods[i] for i in near}
-    beyond_set = as_set(beyond)
-    if beyond_set:
-        weights[beyond_set] = weights.get(beyond_set, 0.0) + math.fsum(likelihoods[i] for i in beyond)
-    return normalised(len(likelihoods), weights)
+def stages_of(frame: JoinedFrame, statuses: Mapping[str, StageStatus]) -> dict[str, Witness]:
+    """How headpose and gesture stand for one frame; `statuses` speaks for those that are missing in it."""
+    stages = {}
+    for stage in (HEADPOSE, GESTURE):
+        part = frame.part_of(stage)
+        if part is not None:
+            stages[stage] = Witness("ok", "", f"{part.stage}/{part.instance}")
+            continue
+        status, reason = statuses.get(stage, NO_ANSWER)
+        stages[stage] = Witness(*(NO_ANSWER if status == "ok" else (status, reason)))
+    return stages
 
 
-def paper_head_assignment(head: HeadObservation, bearings_deg: Sequence[float], config: FusionConfig) -> BeliefAssignment:
-    """Eq. 18 for a head as observed; a normal distribution of the yaw stands for the unpublished numbers of fig. 6."""
-    far = [abs(bearing) > config.phi_f_max_deg for bearing in bearings_deg]
+def gather(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witness], config: EpisodesConfig) -> Evidence:
+    """The evidence of a stroke up to the latest frame; of that frame alone where the person is in no stroke."""
+    if stroke:
+        return _of_stroke(stroke, latest, stages, config)
+    gesture, headpose = stages[GESTURE], stages[HEADPOSE]
+    head = head_now(latest.pose)
+    return Evidence(
+        hand=None,
+        gesture=_resting(latest, gesture) if gesture.status == "ok" else gesture,
+        head=head,
+        headpose=_head_witness(head, latest.pose, headpose, latest.stamp_ns) if headpose.status == "ok" else headpose,
+    )
+
+
+def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witness], config: EpisodesConfig) -> Evidence:
+    """A stage that is dead counts for nothing from then on. One that is only late counts by what it said a moment ago."""
+    gesture, headpose = stages[GESTURE], stages[HEADPOSE]
+    posed = [sample for sample in stroke if sample.pose is not None]
+    weighed = weigh(stroke, config.settle_s)
+    hand, head = None, None
+    if _counts(gesture, stroke, latest, config):
+        hand = hand_over(weighed)
+        gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
+    if _counts(headpose, posed, latest, config):
+        head = head_over(weighed)
+        headpose = _head_witness(head, stroke[-1].pose, headpose, posed[-1].stamp_ns if posed else None)
+    return Evidence(hand, gesture, head, headpose)
+
+
+def _counts(stage: Witness, told: Sequence[Sample], latest: Sample, config: EpisodesConfig) -> bool:
+    if stage.status == "late":
+        return bool(told) and latest.at_ns - told[-1].at_ns <= config.max_evidence_age_s * 1e9
+    return stage.status == "ok"
+
+
+# --- the hand ---------------------------------------------------------------------------------------------------------
+
+
+def hand_over(weighed: Weighed) -> HandObservation | None:
+    """The pointing hand over a stroke; none without a pointing sample."""
+    weighted = [(sample, weight) for sample, weight in weighed if sample.pointing]
+    if not weighted:
+        return None
+    gesture, agreement = _vote(weighted)
+    own = [(s.gesture, w) for s, w in weighted if s.gesture is not None and gesture in (s.pointing, "invisible")]
+    hand = _majority([(g.hand, w) for g, w in own if g.hand is not None])
+    told = [(g, w) for g, w in own if g.bearing_deg is not None and g.bearing_sigma_deg is not None]
+    if not told:
+        return HandObservation(gesture, agreement=agreement, hand=hand)
+    mirrored = bool(_majority([(g.bearing_mirrored, w) for g, w in told]))
+    bearings = [(_in_front(g.bearing_deg or 0.0) if mirrored else (g.bearing_deg or 0.0), w) for g, w in told]
+    bearing, spread = median_and_spread(bearings)
+    stated, _ = median_and_spread([(g.bearing_sigma_deg or 0.0, w) for g, w in told])
+    return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand)
+
+
+def _vote(weighted: Weighed) -> tuple[PointingGesture, float]:
+    """The gesture that most frames saw, and its share. A finger seen now and then outweighs "invisible"."""
+    votes: dict[PointingGesture, float] = dict.fromkeys(POINTING, 0.0)
+    for sample, weight in weighted:
+        if sample.pointing:
+            votes[sample.pointing] += weight
+    total = math.fsum(votes.values())
+    directed: PointingGesture = "point_left" if votes["point_left"] >= votes["point_right"] else "point_right"
+    if votes[directed] >= DIRECTED_SHARE * total:
+        return directed, votes[directed] / (votes["point_left"] + votes["point_right"])
+    return "invisible", votes["invisible"] / total
+
+
+def _in_front(bearing: float) -> float:
+    """The one of b and 180 - b that lies in front of the person, within -90 and 90."""
+    if abs(bearing) <= 90:
+        return bearing
+    return math.copysign(180 - abs(bearing), bearing)
+
+
+def _resting(latest: Sample, stage: Witness) -> Witness:
+    if latest.gesture is None:
+        return Witness("not_tracking", UNKNOWN_PERSON, stage.producer)
+    observed = f"no pointing: {latest.gesture.phase}, {latest.gesture.gesture}"
+    return Witness("ok", observed, stage.producer, latest.stamp_ns)
+
+
+def _hand_witness(hand: HandObservation | None, stage: Witness, stamp_ns: int) -> Witness:
+    if hand is None:
+        return Witness("not_tracking", UNKNOWN_PERSON, stage.producer)
+    bearing = ""
+    if hand.bearing_deg is not None and hand.bearing_sigma_deg is not None:
+        mirror = f" or {hand.mirror_deg:.1f}" if hand.mirror_deg is not None else ""
+        bearing = f", bearing {hand.bearing_deg:.1f}{mirror} +- {hand.bearing_sigma_deg:.1f} deg"
+    return Witness(stage.status, f"{hand.gesture}{bearing}", stage.producer, stamp_ns)
+
+
+# --- the head ---------------------------------------------------------------------------------------------------------
+
+
+def head_now(pose: HeadPose | None) -> HeadObservation | None:
+    """The head as one frame shows it."""
+    if pose is None or pose.status not in ("tracking", "out_of_range"):
+        return None
+    return HeadObservation(pose.yaw_deg if pose.status == "tracking" else None, pose.yaw_sigma_deg, pose.side)
+
+
+def head_over(weighed: Weighed) -> HeadObservation | None:
+    """The head over a stroke; none where it was tracked in too few frames to tell."""
+    total = math.fsum(weight for _, weight in weighed)
+    poses = [(s.pose, w) for s, w in weighed if s.pose is not None and s.pose.status in ("tracking", "out_of_range")]
+    tracked = [(pose, weight) for pose, weight in poses if pose.status == "tracking"]
+    beyond = [(pose, weight) for pose, weight in poses if pose.status == "out_of_range"]
+    tracked_share = math.fsum(weight for _, weight in tracked) / total if total else 0.0
+    beyond_share = math.fsum(weight for _, weight in beyond) / total if total else 0.0
+    if tracked_share + beyond_share < LEAST_HEAD_SHARE:
+        return None
+    if beyond_share > tracked_share:
+        side = _majority([(pose.side, weight) for pose, weight in beyond if pose.side is not None])
+        return HeadObservation(None, None, side, beyond_share)
+    yaw, spread = median_and_spread([(pose.yaw_deg or 0.0, weight) for pose, weight in tracked])
+    stated, _ = median_and_spread([(pose.yaw_sigma_deg or 0.0, weight) for pose, weight in tracked])
+    return HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+
+
+def _head_witness(head: HeadObservation | None, pose: HeadPose | None, stage: Witness, stamp_ns: int | None) -> Witness:
+    if head is None:
+        why = f"head {pose.status}" if pose is not None else UNKNOWN_PERSON
+        return Witness("not_tracking", why, stage.producer)
     if head.yaw_deg is None:
-        return paper_face_assignment([1.0 if is_far else 0.0 for is_far in far], far)
-    sigma = math.hypot(config.paper_head_sigma_deg, head.yaw_sigma_deg or 0.0)
-    likelihoods = [
-        0.0 if is_far else _normal(wrapped_deg(head.yaw_deg - bearing), sigma)
-        for bearing, is_far in zip(bearings_deg, far, strict=True)
-    ]
-    return paper_face_assignment(likelihoods, None)
+        side = f" to the {head.side}" if head.side else ""
+        return Witness(stage.status, f"out of range{side}", stage.producer, stamp_ns)
+    observed = f"yaw {head.yaw_deg:.1f} +- {head.yaw_sigma_deg or 0:.1f} deg"
+    return Witness(stage.status, observed, stage.producer, stamp_ns)
 
 
-# --- ours: the hand ---------------------------------------------------------------------------------------------------
+# --- weighing frames --------------------------------------------------------------------------------------------------
 
 
-def hand_assignment(hand: HandObservation, seen: Sequence[Candidate], config: FusionConfig) -> BeliefAssignment:
-    """Eq. 16 refined by the bearing of the hand.
-
-    The sets of eq. 16 keep part of their mass. The rest goes to single POIs by P(gesture | bearing) P(hand's bearing |
-    bearing): table 1 with soft borders, times a likelihood with a tail. Without a bearing and with hard borders the single
-    masses of a region sum to its mass by eq. 16, so the refinement adds what the bearing tells and nothing else.
-    """
-    bearings = [candidate.bearing_deg for candidate in seen]
-    size = len(bearings)
-    weights = [_gesture_likelihood(hand.gesture, bearing, config) for bearing in bearings]
-    if hand.bearing_deg is not None:
-        weights = [w * _hand_likelihood(hand, candidate, config) for w, candidate in zip(weights, seen, strict=True)]
-    single = normalised(size, {1 << i: weight for i, weight in enumerate(weights)})
-    sets = paper_hand_assignment(hand.gesture, bearings, (config.hand_min_deg, config.hand_max_deg))
-    return _mixed(single, sets, config.hand_refinement).discounted(_rate(config.hand_discount, hand.agreement))
+def weigh(samples: Sequence[Sample], settle_s: float) -> Weighed:
+    """The samples of a stroke with their weights: at the start of a stroke the head may still be on its way."""
+    if not samples:
+        return []
+    settled_ns = samples[0].at_ns + int(settle_s * 1e9)
+    return [(sample, 1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT) for sample in samples]
 
 
-def _gesture_likelihood(gesture: PointingGesture, bearing_deg: float, config: FusionConfig) -> float:
-    """P(gesture | bearing): table 1's columns, blended over the borders of the hand's range instead of cut there."""
-    size = abs(bearing_deg)
-    soft = config.hand_soft_deg
-    inside = _rise(size - config.hand_min_deg, soft) * _rise(config.hand_max_deg - size, soft)
-    row, miss = TABLE_1[gesture], config.hand_miss
-    left = _rise(math.sin(math.radians(bearing_deg)), SIDE_BORDER)
-    # Table 1 is of fingers seen well; how often one is missed within its range depends on the camera.
-    beside = {"point_left": (1 - miss) * left, "point_right": (1 - miss) * (1 - left), "invisible": miss}[gesture]
-    # In the centre table 1 gives both sides .05 on average: more to a POI that lies a little to the side of the gesture.
-    agrees = {"point_left": 2 * left, "point_right": 2 * (1 - left), "invisible": 1.0}[gesture]
-    return max(WRONG_SIDE, inside * beside + (1 - inside) * row["center"] * agrees)
+def median_and_spread(weighted: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Weighted median, and the weighted median absolute deviation from it as a standard deviation."""
+    centre = _median(weighted)
+    return centre, MAD_TO_SIGMA * _median([(abs(value - centre), weight) for value, weight in weighted])
 
 
-def _hand_likelihood(hand: HandObservation, candidate: Candidate, config: FusionConfig) -> float:
-    """P(bearing measured at the hand | POI), per degree, with a uniform tail."""
-    assert hand.bearing_deg is not None
-    sigma = math.hypot(max(hand.bearing_sigma_deg or 0.0, config.hand_sigma_floor_deg), candidate.bearing_sigma_deg)
-    measured = [hand.bearing_deg]
-    if hand.mirrored:
-        measured.append(180.0 - hand.bearing_deg)
-    hit = sum(_normal(wrapped_deg(value - candidate.bearing_deg), sigma) for value in measured) / len(measured)
-    return (1 - config.hand_outlier) * hit + config.hand_outlier / FULL_CIRCLE_DEG
+def _median(weighted: Sequence[tuple[float, float]]) -> float:
+    ordered = sorted(weighted)
+    half = math.fsum(weight for _, weight in ordered) / 2
+    reached = 0.0
+    for value, weight in ordered:
+        reached += weight
+        if reached >= half:
+            return value
+    return ordered[-1][0]
 
 
-# --- ours: the head ---------------------------------------------------------------------------------------------------
-
-
-def head_assignment(head: HeadObservation, seen: Sequence[Candidate], config: FusionConfig) -> BeliefAssignment:
-    """Eq. 18 with a head that turns only part of the way; beyond its range, mass on the POIs out there.
-
-    Yaws that fit no POI, and yaws that fit a look at the robot, leave their mass on the whole frame: the head then says
-    nothing, instead of choosing the least bad POI with full confidence.
-    """
-    rate = _rate(config.head_discount, head.agreement)
-    if head.yaw_deg is None:
-        return _out_of_range(head, seen, config).discounted(rate)
-    size = len(seen)
-    sigma = head.yaw_sigma_deg or 0.0
-    told = 1 - config.head_outlier - config.head_at_robot
-    weights = {
-        1 << i: told / size * head_likelihood(head.yaw_deg, sigma, candidate, config) for i, candidate in enumerate(seen)
-    }
-    at_robot = _normal(head.yaw_deg, math.hypot(sigma, LOOK_AT_ROBOT_SIGMA_DEG))
-    everything = everything_of(size)
-    nothing_told = config.head_at_robot * at_robot + config.head_outlier / FULL_CIRCLE_DEG
-    weights[everything] = weights.get(everything, 0.0) + nothing_told
-    return normalised(size, weights).discounted(rate)
-
-
-def head_likelihood(yaw_deg: float, yaw_sigma_deg: float, candidate: Candidate, config: FusionConfig) -> float:
-    """P(yaw | POI), per degree: a mixture over the part of the way that people turn the head.
-
-    Half of them (`head_full_turn`) turn all the way, the others anything from `head_gain_min` to `head_gain_max`.
-    """
-    bearing = candidate.bearing_deg
-
-    def at(expected: float, gain: float) -> float:
-        sigma = math.sqrt(yaw_sigma_deg**2 + config.head_sigma_deg**2 + (gain * candidate.bearing_sigma_deg) ** 2)
-        return _normal(wrapped_deg(yaw_deg - expected), sigma)
-
-    overshoot = math.copysign(min(config.head_overshoot_deg, abs(bearing) / 10), bearing)
-    full = at(bearing + overshoot, 1.0)
-    partial = math.fsum(at(gain * bearing, gain) for gain in _gains(config)) / GAIN_STEPS
-    return config.head_full_turn * full + (1 - config.head_full_turn) * partial
-
-
-def _out_of_range(head: HeadObservation, seen: Sequence[Candidate], config: FusionConfig) -> BeliefAssignment:
-    """Section 6.2: the head is turned beyond its range. Nested sets, the POIs that are surely out there innermost."""
-    possible = [
-        _beyond_range(candidate.bearing_deg, config) * _side_fits(head.side, candidate.bearing_deg) for candidate in seen
-    ]
-    most = max(possible)
-    if most < LEAST_OUT_OF_RANGE:
-        return vacuous(len(seen))
-    return consonant([value / most for value in possible])
-
-
-def consonant(possibilities: Sequence[float]) -> BeliefAssignment:
-    """The nested assignment whose plausibilities are these possibilities (the largest is 1), in five levels."""
-    size = len(possibilities)
-    weights: dict[int, float] = {}
-    for level in range(POSSIBILITY_LEVELS, 0, -1):
-        threshold = (level - 0.5) / POSSIBILITY_LEVELS
-        subset = as_set(i for i, value in enumerate(possibilities) if value >= threshold)
-        weights[subset] = weights.get(subset, 0.0) + 1 / POSSIBILITY_LEVELS
-    return normalised(size, weights)
-
-
-def _beyond_range(bearing_deg: float, config: FusionConfig) -> float:
-    """P(out of range | POI at this bearing), over the part of the way that people turn the head."""
-
-    def beyond(yaw: float) -> float:
-        return _rise(yaw - config.head_range_deg, config.head_range_soft_deg)
-
-    size = abs(bearing_deg)
-    partial = math.fsum(beyond(gain * size) for gain in _gains(config)) / GAIN_STEPS
-    return config.head_full_turn * beyond(size) + (1 - config.head_full_turn) * partial
-
-
-def _side_fits(side: Side | None, bearing_deg: float) -> float:
-    if side is None:
-        return 1.0
-    # Behind the person left and right meet: a head may turn either way to look there.
-    toward = bearing_deg if side == "left" else -bearing_deg
-    return max(WRONG_SIDE, _rise(min(toward, 180 - toward) if toward > 0 else max(toward, -180 - toward), 3.0))
-
-
-def _gains(config: FusionConfig) -> list[float]:
-    step = (config.head_gain_max - config.head_gain_min) / (GAIN_STEPS - 1)
-    return [config.head_gain_min + i * step for i in range(GAIN_STEPS)]
-
-
-# --- shared -----------------------------------------------------------------------------------------------------------
-
-
-def wrapped_deg(angle: float) -> float:
-    """The same angle within -180 and 180 degrees."""
-    return (angle + 180.0) % FULL_CIRCLE_DEG - 180.0
-
-
-def _regions(bearings_deg: Sequence[float], range_deg: tuple[float, float]) -> dict[Region, list[int]]:
-    found: dict[Region, list[int]] = {"left": [], "center": [], "right": []}
-    for i, bearing in enumerate(bearings_deg):
-        found[region_of(bearing, range_deg)].append(i)
-    return {region: hypotheses for region, hypotheses in found.items() if hypotheses}
-
-
-def _mixed(first: BeliefAssignment, second: BeliefAssignment, share: float) -> BeliefAssignment:
-    """`share` of the first, the rest of the second."""
-    weights = {subset: share * mass for subset, mass in first.masses.items()}
-    for subset, mass in second.masses.items():
-        weights[subset] = weights.get(subset, 0.0) + (1 - share) * mass
-    return normalised(first.size, weights)
-
-
-def _rate(discount: float, agreement: float) -> float:
-    """Discount of a source: its own, and more where the frames of a stroke disagree."""
-    return min(1.0, 1 - (1 - discount) * (0.5 + 0.5 * min(1.0, max(0.0, agreement))))
-
-
-def _normal(distance: float, sigma: float) -> float:
-    return math.exp(-0.5 * (distance / sigma) ** 2) / (sigma * math.sqrt(2 * math.pi))
-
-
-def _rise(x: float, width: float) -> float:
-    """Logistic step from 0 to 1 at x = 0; most of it within +-`width`."""
-    return 1 / (1 + math.exp(max(-50.0, min(50.0, -3 * x / width))))
+def _majority(weighted: Sequence[tuple[T, float]]) -> T | None:
+    """The value of the largest total weight; the earlier one of equals."""
+    totals: dict[T, float] = {}
+    for value, weight in weighted:
+        totals[value] = totals.get(value, 0.0) + weight
+    return max(totals, key=lambda value: totals[value]) if totals else None

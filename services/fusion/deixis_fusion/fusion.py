@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from deixis_runtime.lens import LensError
 from deixis_schemas.messages import (
     MAX_PERSONS,
     Belief,
@@ -12,209 +15,231 @@ from deixis_schemas.messages import (
     Gesture,
     HeadPose,
     OfFrame,
-    PersonBelief,
     Poi,
     Producer,
+    RobotPose,
     Target,
 )
+from deixis_schemas.runs import RunClock
 
 from .config import FusionConfig
-from .discernment import Candidate, candidates
-from .episodes import Stroke
+from .decision import Rules, decide
+from .deixis_rules import DeixisRules
+from .episodes import EpisodeTracker, Stroke
+from .evidence import Evidence, Sample, StageStatus, Witness, gather, stages_of
 from .joining import JoinedFrame
-from .judgement import Judgement, judge
-from .localisation import RobotPlace
-from .person import Person, Published
-from .reason import explain
-from .report import evidence, poi_beliefs, unplaced
-from .stroke import Sample
-from .visibility import Wall
-from .witnesses import SourceView, StageStatus, Witnesses, in_frame, in_stroke, views_of
+from .localisation import Camera, PersonLocator, RobotPlace, face_of
+from .paper_rules import PaperRules
+from .report import Assessment, PersonReport, Rows, TargetReport
+from .robot_path import RobotFix, RobotPath
+from .visibility import Wall, frame_of_discernment
 
 # An update is worth sending when the best POI's pignistic probability has changed by this.
 NOTABLE_CHANGE = 0.05
+KEPT_TARGETS = 16
 
 
-@dataclass(frozen=True)
-class _Moment:
-    """The frame that is being answered, and the time; `now_ns` is none where time stands still."""
+class _Moment(NamedTuple):
+    """The frame that is being answered and its time by `RunClock`; `now_ns` is Unix time, none where it stands still."""
 
-    source: OfFrame
-    views: Mapping[str, SourceView]
+    frame: OfFrame
+    at_ns: int
+    stages: Mapping[str, Witness]
+    robot: RobotFix
     now_ns: int | None
 
 
-@dataclass(frozen=True)
-class _Assessment:
-    """What is thought about one person: who said what, which POIs come into question, and what follows."""
+@dataclass
+class _Published:
+    """What was last published of an open episode: to send updates on change only, at a bounded rate."""
 
-    witnesses: Witnesses
-    seen: list[Candidate]
-    judgement: Judgement | None
+    at_ns: int
+    poi_ids: tuple[str, ...]
+    best: float
 
-    @property
-    def poi_ids(self) -> tuple[str, ...]:
-        """The answer."""
-        return tuple(self.seen[i].poi.poi_id for i in self.judgement.choice.hypotheses) if self.judgement else ()
 
-    @property
-    def best(self) -> float:
-        """Largest pignistic probability."""
-        return max(self.judgement.combination.belief.pignistic()) if self.judgement else 0.0
+class _Person:
+    """State of one person between frames."""
 
-    @property
-    def conflict(self) -> float:
-        """Conflict mass 1 - K."""
-        return self.judgement.combination.conflict if self.judgement else 0.0
+    def __init__(self, person_id: int, config: FusionConfig) -> None:
+        self.person_id = person_id
+        self.locator = PersonLocator(config.place)
+        self.episodes = EpisodeTracker(person_id, config.episodes)
+        self.published: _Published | None = None
+        self.seen_ns = 0
+
+
+def rules_of(config: FusionConfig) -> Rules:
+    """The rules by their setting."""
+    if config.rules == "paper":
+        return PaperRules(config.paper)
+    return DeixisRules(config.hand, config.head, config.answer)
 
 
 class Fusion:
     """Follows persons from frame to frame.
 
-    The answer to a frame depends on the frames before it and on what was set; not on a clock.
+    The answer to a frame depends on the frames of its run before it and on what was set; not on a clock. `persons` is the
+    standing of each in the last frame, `recent` are the last final answers.
     """
 
     def __init__(self, config: FusionConfig, producer: Producer) -> None:
         self._config = config
         self._producer = producer
-        self._pois: list[Poi] = []
-        self._walls: list[Wall] = []
-        self._camera: CameraInfo | None = None
-        self._robot = RobotPlace()
-        self._persons: dict[int, Person] = {}
+        self._rules = rules_of(config)
+        self._rows = Rows(config.answer.rows)
+        self._pois: Sequence[Poi] = ()
+        self._walls: Sequence[Wall] = ()
+        self._camera: Camera | None = None
+        self._clock = RunClock()
+        self._followed: dict[int, _Person] = {}
         self._moment: _Moment | None = None
+        self.robot = RobotPath(config.place.robot_pose_max_age_s)
+        self.persons: list[PersonReport] = []
+        self.recent: deque[TargetReport] = deque(maxlen=KEPT_TARGETS)
 
     def set_pois(self, pois: Sequence[Poi]) -> None:
         """The POIs that may be meant from now on."""
-        self._pois = list(pois)
+        self._pois = sorted(pois, key=lambda poi: poi.poi_id)
 
     def set_walls(self, walls: Sequence[Wall]) -> None:
         """What nobody sees through: segments in the map frame, metres."""
-        self._walls = list(walls)
+        self._walls = tuple(walls)
 
-    def set_camera(self, info: CameraInfo) -> None:
-        """How the camera projects, and where it is mounted."""
-        self._camera = info
+    def set_camera(self, info: CameraInfo) -> str | None:
+        """How the camera projects, and where it is mounted. Returns why persons cannot be placed, if so."""
+        try:
+            self._camera = Camera.of(info)
+        except LensError as error:
+            self._camera = None
+            return str(error)
+        return None
 
-    def set_robot(self, place: RobotPlace) -> None:
-        """Where the robot stands."""
-        self._robot = place
+    def start_robot_at(self, place: RobotPlace) -> None:
+        """Where the robot stands until it says otherwise."""
+        self.robot.start_at(place)
+
+    def hear_robot(self, pose: RobotPose) -> None:
+        """The robot says where it is."""
+        self.robot.hear(pose)
+
+    @property
+    def robot_doubt(self) -> str:
+        """Why the robot may have stood elsewhere at the last frame; empty where nothing speaks against it."""
+        return self._moment.robot.doubt if self._moment else ""
 
     def open_episodes(self) -> list[str]:
         """Ids of the pointing episodes in progress."""
-        return [p.episodes.open_episode.episode_id for p in self._persons.values() if p.episodes.open_episode is not None]
+        episodes = (person.episodes.open_episode for person in self._followed.values())
+        return [episode.episode_id for episode in episodes if episode is not None]
 
     def answer(
         self, frame: JoinedFrame, statuses: Mapping[str, StageStatus], now_ns: int | None
     ) -> tuple[Belief, list[Target]]:
         """Answer one frame, and say what it changed in the pointing episodes.
 
-        `statuses` speaks for the stages that are missing in the frame. `now_ns` is Unix time, or none in lockstep, where ages
-        and latencies are 0.
+        The first frame of a run ends the episodes of the last one; its persons are forgotten. `statuses` speaks for the
+        stages that are missing in the frame. `now_ns` is Unix time, or none in lockstep, where ages and latencies are 0.
         """
-        moment = _Moment(frame.source, views_of(frame, statuses), now_ns)
+        source = frame.source
+        new_run, at_ns, _ = self._clock.advance(source.run, source.stamp_ns)
+        targets = self.end(now_ns) if new_run else []
+        moment = _Moment(source, at_ns, stages_of(frame, statuses), self.robot.at(source.stamp_ns), now_ns)
         self._moment = moment
         poses = {pose.person_id: pose for pose in frame.poses.poses} if frame.poses else {}
         gestures = {gesture.person_id: gesture for gesture in frame.gestures.gestures} if frame.gestures else {}
         present = _present(frame, poses, gestures)
-        beliefs, targets = [], []
+        self.persons = []
         for person_id in present:
-            person = self._persons.setdefault(person_id, Person(person_id, self._config))
-            person.seen_ns = moment.source.stamp_ns
-            if frame.tracks is not None:
-                person.see(frame.tracks, poses.get(person_id), self._camera, self._robot)
-            belief, told = self._follow(person, Sample(person.seen_ns, gestures.get(person_id), poses.get(person_id)), moment)
-            beliefs.append(belief)
-            targets += told
-        targets += self._miss(set(self._persons) - set(present), moment)
-        return Belief.derive(moment.source, self._producer, persons=beliefs, missing=list(frame.missing)), targets
+            person = self._followed.setdefault(person_id, _Person(person_id, self._config))
+            person.seen_ns = at_ns
+            self._see(person, frame, poses.get(person_id), moment)
+            sample = Sample(at_ns, source.stamp_ns, gestures.get(person_id), poses.get(person_id))
+            targets += self._follow(person, sample, moment)
+        targets += self._miss(set(self._followed) - set(present), moment)
+        beliefs = [report.message(self._rows) for report in self.persons]
+        return Belief.derive(source, self._producer, persons=beliefs, missing=list(frame.missing)), targets
 
     def end(self, now_ns: int | None) -> list[Target]:
         """The source has ended or starts anew: final answers of all open episodes. Persons are forgotten."""
         targets = []
         if self._moment is not None:
-            moment = _Moment(self._moment.source, self._moment.views, now_ns)
-            targets = [t for person in self._persons.values() for t in self._final(person, person.episodes.finish(), moment)]
-        self._persons = {}
+            for person in self._followed.values():
+                targets += self._final(person, person.episodes.finish(), self._moment, now_ns)
+        self._followed, self.persons = {}, []
         return targets
 
-    def _follow(self, person: Person, sample: Sample, moment: _Moment) -> tuple[PersonBelief, list[Target]]:
-        targets = self._final(person, person.episodes.observe(sample), moment)
-        stroke = person.episodes.stroke
-        if stroke is None:
-            assessment = self._assess(person, in_frame(sample, moment.views))
-        else:
-            assessment = self._assess(person, in_stroke(stroke.samples, sample, moment.views, self._config))
-        if stroke is not None and stroke.is_open and self._is_news(person, assessment, moment):
-            targets.append(self._target(person, stroke, assessment, moment, final=False))
-        return self._belief(person, assessment, moment), targets
+    def _see(self, person: _Person, frame: JoinedFrame, pose: HeadPose | None, moment: _Moment) -> None:
+        if frame.tracks is None:
+            return
+        face, size = face_of(frame.tracks, person.person_id), (frame.tracks.width, frame.tracks.height)
+        person.locator.see(face, size, pose, (self._camera, moment.robot.place), moment.at_ns)
 
-    def _assess(self, person: Person, witnesses: Witnesses) -> _Assessment:
-        place, config = person.place, self._config
-        seen = candidates(place, self._pois, self._walls, config.wall_clearance_m) if place else []
-        return _Assessment(witnesses, seen, judge(seen, witnesses.hand, witnesses.head, config) if seen else None)
+    def _follow(self, person: _Person, sample: Sample, moment: _Moment) -> list[Target]:
+        """Take in a frame that shows the person."""
+        targets = self._final(person, person.episodes.observe(sample), moment, moment.now_ns)
+        stroke, episode = person.episodes.stroke, person.episodes.open_episode
+        evidence = gather(stroke.samples if stroke else (), sample, moment.stages, self._config.episodes)
+        assessment = self._assess(person, evidence, moment)
+        if episode is not None and self._is_news(person, assessment, moment):
+            targets.append(self._tell(person, episode, assessment, moment, moment.now_ns))
+        episode_id = episode.episode_id if episode else None
+        self.persons.append(PersonReport(person.person_id, assessment, episode_id, moment.now_ns))
+        return targets
 
     def _miss(self, absent: set[int], moment: _Moment) -> list[Target]:
         """Persons that this frame does not show: their strokes go on for the length of a drop-out only."""
         targets: list[Target] = []
-        stamp_ns = moment.source.stamp_ns
         for person_id in sorted(absent):
-            person = self._persons[person_id]
-            targets += self._final(person, person.episodes.observe(Sample(stamp_ns, None, None)), moment)
-            if stamp_ns - person.seen_ns > self._config.hold_position_s * 1e9 and person.episodes.stroke is None:
-                del self._persons[person_id]
+            person = self._followed[person_id]
+            nothing = Sample(moment.at_ns, moment.frame.stamp_ns, None, None)
+            targets += self._final(person, person.episodes.observe(nothing), moment, moment.now_ns)
+            if moment.at_ns - person.seen_ns > self._config.place.hold_s * 1e9 and person.episodes.stroke is None:
+                del self._followed[person_id]
         return targets
 
-    def _final(self, person: Person, ended: Stroke | None, moment: _Moment) -> list[Target]:
+    def _assess(self, person: _Person, evidence: Evidence, moment: _Moment) -> Assessment:
+        place, judgement = person.locator.place, None
+        if place is not None:
+            seen = frame_of_discernment(place, self._pois, self._walls, self._config.place.wall_clearance_m)
+            judgement = decide(seen, evidence, self._rules, self._config.answer.max_unknown) if seen else None
+        return Assessment(place, evidence, judgement, self._pois, moment.robot.doubt)
+
+    def _final(self, person: _Person, ended: Stroke | None, moment: _Moment, now_ns: int | None) -> list[Target]:
         if ended is None:
             return []
         person.published = None
-        latest = Sample(moment.source.stamp_ns, None, None)
-        assessment = self._assess(person, in_stroke(ended.samples, latest, moment.views, self._config))
-        return [self._target(person, ended, assessment, moment, final=True)]
+        latest = Sample(moment.at_ns, moment.frame.stamp_ns, None, None)
+        evidence = gather(ended.samples, latest, moment.stages, self._config.episodes)
+        return [self._tell(person, ended, self._assess(person, evidence, moment), moment, now_ns, final=True)]
 
-    def _is_news(self, person: Person, assessment: _Assessment, moment: _Moment) -> bool:
+    def _is_news(self, person: _Person, assessment: Assessment, moment: _Moment) -> bool:
         """Whether an update is due; takes note of it."""
         last = person.published
         if last is not None:
-            too_soon = moment.source.stamp_ns - last.stamp_ns < self._config.update_every_s * 1e9
+            too_soon = moment.at_ns - last.at_ns < self._config.answer.update_every_s * 1e9
             same = assessment.poi_ids == last.poi_ids and abs(assessment.best - last.best) < NOTABLE_CHANGE
             if too_soon or same:
                 return False
-        person.published = Published(moment.source.stamp_ns, assessment.poi_ids, assessment.best)
+        person.published = _Published(moment.at_ns, assessment.poi_ids, assessment.best)
         return True
 
-    def _belief(self, person: Person, assessment: _Assessment, moment: _Moment) -> PersonBelief:
-        place, episode, judgement = person.place, person.episodes.open_episode, assessment.judgement
-        return PersonBelief(
+    def _tell(
+        self, person: _Person, stroke: Stroke, assessment: Assessment, moment: _Moment, now_ns: int | None, final: bool = False
+    ) -> Target:
+        report = TargetReport(
+            frame=OfFrame.derive(moment.frame, self._producer),
             person_id=person.person_id,
-            position_m=place.position_m if place else None,
-            distance_m=place.distance_m if place else None,
-            pois=poi_beliefs(judgement, assessment.seen) if judgement else unplaced(self._pois if place is None else []),
-            unknown=judgement.combination.belief.unknown if judgement else 1.0,
-            conflict=assessment.conflict,
-            evidence=evidence(assessment.witnesses, judgement, assessment.seen, moment.now_ns),
-            episode_id=episode.episode_id if episode else None,
-        )
-
-    def _target(self, person: Person, stroke: Stroke, assessment: _Assessment, moment: _Moment, *, final: bool) -> Target:
-        judgement, seen = assessment.judgement, assessment.seen
-        rows = poi_beliefs(judgement, seen) if judgement else []
-        return Target.derive(
-            moment.source,
-            self._producer,
             episode_id=stroke.episode_id,
-            person_id=person.person_id,
+            started_ns=stroke.first.stamp_ns,
+            ended_ns=stroke.last.stamp_ns,
             final=final,
-            poi_ids=list(assessment.poi_ids),
-            pois=sorted(rows, key=lambda row: (-row.pignistic, row.poi_id)),
-            conflict=assessment.conflict,
-            evidence=evidence(assessment.witnesses, judgement, seen, moment.now_ns),
-            reason=explain(judgement, seen, assessment.witnesses, person.place is not None),
-            started_ns=stroke.started_ns,
-            ended_ns=stroke.last_pointing_ns,
-            latency_ms=0.0 if moment.now_ns is None else max(0.0, (moment.now_ns - moment.source.stamp_ns) / 1e6),
+            assessment=assessment,
+            now_ns=now_ns,
         )
+        if final:
+            self.recent.append(report)
+        return report.message(self._rows)
 
 
 def _present(frame: JoinedFrame, poses: Mapping[int, HeadPose], gestures: Mapping[int, Gesture]) -> list[int]:

@@ -52,28 +52,29 @@ class FrameJoiner:
     """Collects the parts of frames and hands out each frame once, in the order of `seq`.
 
     A frame is due when every stage has answered it or, which is as good as a no, a later one; or when `age_limit_s` has
-    passed since its tracks arrived. Tracks of another run begin that run: what is left of the last one is dropped.
+    passed since its tracks arrived. Tracks of another run begin that run: what is left of the last one is due at once.
     """
 
     def __init__(self, age_limit_s: float) -> None:
         self._age_limit_s = age_limit_s
         self._pending: dict[FrameId, _Pending] = {}
+        self._left: list[JoinedFrame] = []
         self._newest: dict[str, int] = {}
         self._run: int | None = None
+        self._last_run: int | None = None
         self._answered = -1
-        self.late = 0
+        self.dropped = 0
 
-    def add(self, part: Part, now_s: float) -> bool:
-        """Take in a message that arrived at `now_s` (monotonic). Returns whether it begins a new run of the camera.
+    def add(self, part: Part, now_s: float) -> None:
+        """Take in a message that arrived at `now_s` (monotonic).
 
-        Parts of frames that have been answered are dropped and counted as `late`.
+        Parts of frames that have been answered are `dropped`, and so are the oldest frames where too many wait.
         """
-        new_run = isinstance(part, Tracks) and self._run not in (None, part.run)
-        if self._run is None or new_run:
+        if self._run is None or (isinstance(part, Tracks) and part.run != self._run):
             self._begin(part.run)
-        if part.run == self._run and part.seq <= self._answered:
-            self.late += 1
-            return new_run
+        if part.run == self._last_run or (part.run == self._run and part.seq <= self._answered):
+            self.dropped += 1
+            return
         pending = self._pending.setdefault(part.frame_id, _Pending(now_s))
         if isinstance(part, Tracks):
             pending.arrived_s = now_s
@@ -82,29 +83,26 @@ class FrameJoiner:
         if part.run == self._run:
             self._newest[stage_of(part)] = max(self._newest.get(stage_of(part), -1), part.seq)
         self._forget_oldest()
-        return new_run
 
     def due(self, now_s: float, absent: Collection[str] = ()) -> list[JoinedFrame]:
         """The frames to be answered now, oldest first. Stages in `absent` are known to be dead and not waited for."""
-        ready = []
-        for frame_id in sorted(self._of_this_run()):
-            pending = self._pending[frame_id]
-            if not self._is_due(frame_id, pending, now_s, absent):
+        ready, self._left = self._left, []
+        for frame_id in self._of_run(self._run):
+            if not self._is_due(frame_id, self._pending[frame_id], now_s, absent):
                 break
-            frame = pending.frame
-            frame.missing = tuple(stage for stage in STAGES if frame.part_of(stage) is None)
-            ready.append(frame)
+            ready.append(self._pending.pop(frame_id).frame)
             self._answered = frame_id.seq
-            del self._pending[frame_id]
+        for frame in ready:
+            frame.missing = tuple(stage for stage in STAGES if frame.part_of(stage) is None)
         return ready
 
     def next_due_s(self) -> float | None:
         """When the oldest frame reaches the age limit (monotonic seconds); none where nothing waits."""
-        arrivals = [self._pending[frame_id].arrived_s for frame_id in self._of_this_run()]
+        arrivals = [self._pending[frame_id].arrived_s for frame_id in self._of_run(self._run)]
         return min(arrivals) + self._age_limit_s if arrivals else None
 
-    def _of_this_run(self) -> list[FrameId]:
-        return [frame_id for frame_id in self._pending if frame_id.run == self._run]
+    def _of_run(self, run: int | None) -> list[FrameId]:
+        return sorted(frame_id for frame_id in self._pending if frame_id.run == run)
 
     def _is_due(self, frame_id: FrameId, pending: _Pending, now_s: float, absent: Collection[str]) -> bool:
         if now_s - pending.arrived_s >= self._age_limit_s:
@@ -115,19 +113,19 @@ class FrameJoiner:
         )
 
     def _begin(self, run: int) -> None:
+        self._left += [self._pending.pop(frame_id).frame for frame_id in self._of_run(self._run)]
+        self._run, self._last_run, self._answered = run, self._run, -1
         # Poses and gestures may have come before the first tracks of their run: keys do not wait for each other.
-        self._pending = {frame_id: pending for frame_id, pending in self._pending.items() if frame_id.run == run}
-        self._run, self._answered = run, -1
         self._newest = {}
-        for frame_id, pending in self._pending.items():
+        for frame_id in self._of_run(run):
             for stage in STAGES:
-                if pending.frame.part_of(stage) is not None:
-                    self._newest[stage] = max(self._newest.get(stage, -1), frame_id.seq)
+                if self._pending[frame_id].frame.part_of(stage) is not None:
+                    self._newest[stage] = frame_id.seq
 
     def _forget_oldest(self) -> None:
         while len(self._pending) > MAX_PENDING:
             del self._pending[min(self._pending, key=lambda frame_id: self._pending[frame_id].arrived_s)]
-            self.late += 1
+            self.dropped += 1
 
 
 def _fill(frame: JoinedFrame, part: Part) -> None:

@@ -8,11 +8,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from deixis_schemas.messages import CameraInfo
+from deixis_runtime.lens import Lens, LensError
+from deixis_schemas.anatomy import FACE_WIDTH_M
+from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Track, Tracks
+
+from .config import PlaceConfig
 
 Vector = tuple[float, float, float]
 
-UNDISTORT_STEPS = 20
+# What a message can say of a position, to either side of the map's origin.
+FARTHEST_M = 1e5
+FOCAL_LIMIT_PX = 1e6
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,22 @@ class RobotPlace:
     x_m: float = 0.0
     y_m: float = 0.0
     yaw_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """How the camera projects, and where it is mounted."""
+
+    lens: Lens
+    mount: CameraMount
+
+    @staticmethod
+    def of(info: CameraInfo) -> Camera:
+        """The camera that this message tells of. Raises LensError where it has no intrinsics, or none that can be."""
+        lens = Lens.of(info)
+        if not all(1 <= focal <= FOCAL_LIMIT_PX for focal in lens.matrix[:2]):
+            raise LensError(f"camera_matrix: focal lengths of {lens.matrix[0]:.3g} and {lens.matrix[1]:.3g} pixels")
+        return Camera(lens, info.mount)
 
 
 @dataclass(frozen=True)
@@ -43,44 +65,30 @@ class PersonPlace:
     sigma_m: float
 
 
-def camera_in_map(info: CameraInfo, robot: RobotPlace) -> Vector:
-    """Optical centre in the map frame, metres."""
-    return _to_map(info.mount.position_m, robot)
-
-
-def locate(info: CameraInfo, robot: RobotPlace, head: HeadSighting, sigma: float) -> PersonPlace:
-    """Place in the map of a head as sighted; `sigma` is the relative standard deviation of its depth.
-
-    Raises ValueError where `info` has no intrinsics.
-    """
-    x, y = viewing_ray(info, head.centre_px, head.image_size)
-    camera = camera_in_map(info, robot)
+def locate(camera: Camera, robot: RobotPlace, head: HeadSighting, sigma: float) -> PersonPlace:
+    """Place in the map of a head as sighted; `sigma` is the relative standard deviation of its depth."""
+    x, y = camera.lens.ray(head.centre_px, head.image_size)
     ray = (x * head.depth_m, y * head.depth_m, head.depth_m)
-    position = _to_map(_add(info.mount.position_m, _to_base(ray, info)), robot)
-    distance = math.dist(position, camera)
-    return PersonPlace(position_m=position, camera_m=camera, distance_m=distance, sigma_m=distance * sigma)
+    centre = _to_map(camera.mount.position_m, robot)
+    position = _to_map(_add(camera.mount.position_m, to_base(ray, camera.mount)), robot)
+    distance = math.dist(position, centre)
+    return PersonPlace(position_m=position, camera_m=centre, distance_m=distance, sigma_m=distance * sigma)
 
 
-def depth_of_face(info: CameraInfo, width_px: float, image_width: int, face_width_m: float) -> float:
-    """Distance along the optical axis of a face `width_px` wide: f * face_width_m / width_px.
-
-    Raises ValueError where `info` has no intrinsics or the face no width.
-    """
-    if width_px <= 0:
-        raise ValueError("width_px: a face without width has no distance")
-    return _focal_x(info, image_width) * face_width_m / width_px
+def depth_of_face(lens: Lens, width_px: float, image_size: tuple[int, int]) -> float:
+    """Distance along the optical axis, metres, of a face `width_px` wide from ear to ear in a picture of that size."""
+    return lens.focal_x_px(image_size) * FACE_WIDTH_M / width_px
 
 
-def viewing_ray(info: CameraInfo, pixel: tuple[float, float], image_size: tuple[int, int]) -> tuple[float, float]:
-    """Direction of a pixel in the optical frame as x/z, y/z, free of distortion.
-
-    Raises ValueError where `info` has no intrinsics.
-    """
-    fx, _, cx, _, fy, cy, *_ = _matrix(info)
-    # K belongs to the calibrated size: pixel centres are integers, so scaling is about -0.5.
-    u = (pixel[0] + 0.5) * (info.width / image_size[0]) - 0.5 if info.width else pixel[0]
-    v = (pixel[1] + 0.5) * (info.height / image_size[1]) - 0.5 if info.height else pixel[1]
-    return _undistort(info, (u - cx) / fx, (v - cy) / fy)
+def to_base(optical: Vector, mount: CameraMount) -> Vector:
+    """A direction in the optical frame turned into `base_link`: by the mount's roll, then its pitch, then its yaw."""
+    roll, pitch, yaw = (math.radians(angle) for angle in (mount.roll_deg, mount.pitch_up_deg, mount.yaw_deg))
+    right = optical[0] * math.cos(roll) - optical[1] * math.sin(roll)
+    down = optical[0] * math.sin(roll) + optical[1] * math.cos(roll)
+    forward, left, up = optical[2], -right, -down
+    ahead = forward * math.cos(pitch) - up * math.sin(pitch)
+    z = forward * math.sin(pitch) + up * math.cos(pitch)
+    return ahead * math.cos(yaw) - left * math.sin(yaw), ahead * math.sin(yaw) + left * math.cos(yaw), z
 
 
 def bearing_deg(place: PersonPlace, target_m: Vector) -> float:
@@ -93,15 +101,67 @@ def bearing_deg(place: PersonPlace, target_m: Vector) -> float:
     return math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
-def bearing_sigma_deg(place: PersonPlace, target_m: Vector, extent_m: float) -> float:
-    """Standard deviation of that bearing from the person's distance and the POI's extent, degrees, at most 60.
+def bearing_with_sigma_deg(place: PersonPlace, target_m: Vector, extent_m: float) -> tuple[float, float]:
+    """That bearing, and its standard deviation from the person's distance and the POI's extent, degrees, at most 60.
 
     The person's place is uncertain along the line to the camera: that moves the bearing of what lies to the side.
     """
+    bearing = bearing_deg(place, target_m)
     away = max(math.dist(place.position_m[:2], target_m[:2]), 0.05)
-    across = place.sigma_m * math.sin(math.radians(bearing_deg(place, target_m)))
+    across = place.sigma_m * math.sin(math.radians(bearing))
     spread = math.hypot(across, extent_m / math.sqrt(12))
-    return min(60.0, math.degrees(math.atan2(spread, away)))
+    return bearing, min(60.0, math.degrees(math.atan2(spread, away)))
+
+
+def wrapped_deg(angle: float) -> float:
+    """The same angle within -180 and 180 degrees."""
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+class PersonLocator:
+    """Where one person is, from frame to frame. `now_ns` is the time of `RunClock`."""
+
+    def __init__(self, config: PlaceConfig) -> None:
+        self._config = config
+        self._distance = DistanceFilter(config.distance_time_s)
+        self._placed_ns: int | None = None
+        self.place: PersonPlace | None = None
+
+    def see(
+        self,
+        face: Track | None,
+        size: tuple[int, int],
+        pose: HeadPose | None,
+        view: tuple[Camera | None, RobotPlace],
+        now_ns: int,
+    ) -> None:
+        """Take in where the person's face is in a picture of that size; the last place is held where it is not seen.
+
+        `view` is the camera, none while its intrinsics are not known, and where the robot was then.
+        """
+        camera, robot = view
+        if face is not None and camera is not None:
+            self.place = self._placed(face, size, pose, camera, robot, now_ns)
+            self._placed_ns = now_ns
+        elif self._placed_ns is not None and now_ns - self._placed_ns > self._config.hold_s * 1e9:
+            self.place = None
+
+    def _placed(
+        self, face: Track, size: tuple[int, int], pose: HeadPose | None, camera: Camera, robot: RobotPlace, now_ns: int
+    ) -> PersonPlace | None:
+        x, y, width, height = face.bbox_px
+        elapsed_s = (now_ns - self._placed_ns) / 1e9 if self._placed_ns is not None else 0.0
+        measured = depth_of_face(camera.lens, width, size)
+        depth = self._distance.update(measured, elapsed_s, self._is_frontal(pose))
+        # Pixel centres are integers: a box from x to x + width - 1 is centred half a pixel before x + width / 2.
+        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
+        place = locate(camera, robot, HeadSighting(centre, size, depth), self._config.distance_sigma)
+        return place if all(abs(value) <= FARTHEST_M for value in place.position_m) else None
+
+    def _is_frontal(self, pose: HeadPose | None) -> bool:
+        if pose is None or pose.status != "tracking":
+            return pose is None or pose.status != "out_of_range"
+        return abs(pose.yaw_deg or 0.0) < self._config.frontal_yaw_deg
 
 
 class DistanceFilter:
@@ -129,24 +189,10 @@ class DistanceFilter:
         return math.exp(self._log_depth)
 
 
-def _matrix(info: CameraInfo) -> tuple[float, ...]:
-    if info.camera_matrix is None:
-        raise ValueError("camera_matrix: the camera has no intrinsics yet")
-    return info.camera_matrix
-
-
-def _focal_x(info: CameraInfo, image_width: int) -> float:
-    scale = image_width / info.width if info.width else 1.0
-    return _matrix(info)[0] * scale
-
-
-def _to_base(optical: Vector, info: CameraInfo) -> Vector:
-    """A direction in the optical frame turned into `base_link`."""
-    forward, left, up = optical[2], -optical[0], -optical[1]
-    pitch, yaw = math.radians(info.mount.pitch_up_deg), math.radians(info.mount.yaw_deg)
-    ahead = forward * math.cos(pitch) - up * math.sin(pitch)
-    z = forward * math.sin(pitch) + up * math.cos(pitch)
-    return ahead * math.cos(yaw) - left * math.sin(yaw), ahead * math.sin(yaw) + left * math.cos(yaw), z
+def face_of(tracks: Tracks, person_id: int) -> Track | None:
+    """The person's face in these tracks: of several, the one believed most. None without a box of some width."""
+    faces = [t for t in tracks.tracks if t.person_id == person_id and t.kind == "face" and t.bbox_px[2] >= 1]
+    return max(faces, key=lambda track: (track.observed, track.confidence), default=None)
 
 
 def _to_map(base: Vector, robot: RobotPlace) -> Vector:
@@ -156,42 +202,3 @@ def _to_map(base: Vector, robot: RobotPlace) -> Vector:
 
 def _add(a: Vector, b: Vector) -> Vector:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _undistort(info: CameraInfo, x: float, y: float) -> tuple[float, float]:
-    if info.distortion_model == "none" or not any(info.distortion):
-        return x, y
-    if info.distortion_model == "equidistant":
-        return _undistort_equidistant(info.distortion, x, y)
-    return _undistort_brown(info.distortion, x, y)
-
-
-def _undistort_brown(coefficients: list[float], x: float, y: float) -> tuple[float, float]:
-    """Inverse of OpenCV's plumb-bob and rational models by fixed-point steps."""
-    k1, k2, p1, p2, k3, k4, k5, k6 = (coefficients + [0.0] * 8)[:8]
-    u, v = x, y
-    for _ in range(UNDISTORT_STEPS):
-        r2 = u * u + v * v
-        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-        if abs(radial) < 1e-6:
-            return x, y
-        tangential_x = 2 * p1 * u * v + p2 * (r2 + 2 * u * u)
-        tangential_y = p1 * (r2 + 2 * v * v) + 2 * p2 * u * v
-        u, v = (x - tangential_x) / radial, (y - tangential_y) / radial
-    # Outside the range that the coefficients describe the steps run away: then the pixel as it is serves better.
-    return (u, v) if math.isfinite(u) and math.isfinite(v) and math.hypot(u, v) < 10 else (x, y)
-
-
-def _undistort_equidistant(coefficients: list[float], x: float, y: float) -> tuple[float, float]:
-    """Inverse of the Kannala-Brandt fisheye model."""
-    k1, k2, k3, k4 = (coefficients + [0.0] * 4)[:4]
-    distorted = math.hypot(x, y)
-    if distorted < 1e-9:
-        return x, y
-    angle = distorted
-    for _ in range(UNDISTORT_STEPS):
-        a2 = angle * angle
-        angle = distorted / (1 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
-    angle = min(max(angle, 0.0), math.radians(89))
-    scale = math.tan(angle) / distorted
-    return x * scale, y * scale

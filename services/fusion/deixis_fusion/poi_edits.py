@@ -1,38 +1,61 @@
-"""Answers gets and takes edits on `fusion/poi/**`."""
+"""POIs as seen from their keys `fusion/poi/{id}`: gets, acknowledged edits, and puts and deletes that nobody waits for."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from deixis_runtime.queries import Edit, Query, Refused
-from deixis_schemas.messages import Message, Poi, RejectedEdit
+from deixis_runtime.queries import Edit, Query, Refused, key_matches
+from deixis_schemas.codec import MSGPACK, CodecError, Malformed, WrongType, WrongVersion, parse_json, unpack, validate
+from deixis_schemas.messages import MAX_TEXT, Message, Poi, RejectedEdit
 
-from .edits import EditError, matches, poi_id_of, read_poi
-from .registry import Registry, RegistryError
+from .registry import Change, Delete, Put, Registry, RegistryError
 
 KEPT_REJECTIONS = 16
 OPERATIONS = ("put", "delete")
+MAX_BYTES = 64 << 10
+# What generic Zenoh clients send: JSON under its own label, as text, or without any.
+JSON_LABELS = ("", "application/json", "text/json", "text/plain", "zenoh/string", "zenoh/bytes")
+
+
+class EditError(ValueError):
+    """An edit that is refused; the text begins with the field's name."""
 
 
 class PoiEdits:
-    """The registry as seen from its keys: reads, acknowledged edits, and edits without an answer."""
+    """Reads the registry and edits it; counts, and keeps the last refusals."""
 
-    def __init__(self, registry: Registry, prefix: str) -> None:
-        """`prefix` is the key of the POIs up to their id, e.g. `deixis/r1/fusion/poi/`."""
+    def __init__(self, registry: Registry, prefix: str, announce: Callable[[str, Poi | None], None]) -> None:
+        """`prefix` is the key of the POIs up to their id, e.g. `deixis/r1/fusion/poi/`.
+
+        `announce` tells those who watch the keys of an acknowledged edit: of the POI by its id, none where it was deleted. The
+        other edits they have heard themselves.
+        """
         self._registry = registry
         self._prefix = prefix
+        self._announce = announce
         self.accepted = 0
         self.rejected = 0
         self.rejections: deque[RejectedEdit] = deque(maxlen=KEPT_REJECTIONS)
 
-    def take(self, edit: Edit, now_ns: int) -> str | None:
-        """Do an edit that nobody waits for. Returns why it was refused, or none when it is on disk."""
-        try:
-            self._edit(edit.kind, edit.key, edit.payload, edit.encoding)
-        except (EditError, RegistryError) as error:
-            self._reject(edit.key, str(error), now_ns)
-            return str(error)
-        return None
+    def take(self, edits: Sequence[Edit], now_ns: int) -> list[str]:
+        """Do edits that nobody waits for, in one transaction. Returns why some of them were refused."""
+        keys, changes, refused = [], [], []
+        for edit in edits:
+            try:
+                change = self._change(edit.kind, edit.key, edit.payload, edit.encoding)
+            except EditError as error:
+                refused.append(self._reject(edit.key, str(error), now_ns))
+            else:
+                keys.append(edit.key)
+                changes.append(change)
+        for key, result in zip(keys, self._registry.apply(changes), strict=True):
+            if isinstance(result, RegistryError):
+                refused.append(self._reject(key, str(result), now_ns))
+            else:
+                self.accepted += 1
+        return refused
 
     def answer(self, query: Query, now_ns: int) -> list[tuple[str, Message]]:
         """Answer a get: the matching POIs each under its own key or, with a payload or `op`, an edit's stored POI.
@@ -41,24 +64,70 @@ class PoiEdits:
         """
         operation = query.parameters.get("op", "put" if query.payload else "")
         if not operation:
-            return [(key, poi) for poi in self._registry.pois() if matches(query.key, key := self._prefix + poi.poi_id)]
+            keys = ((self._prefix + poi.poi_id, poi) for poi in self._registry.pois())
+            return [(key, poi) for key, poi in keys if key_matches(query.key, key)]
         if operation not in OPERATIONS:
             raise Refused(f"op: '{operation[:40]}' is neither 'put' nor 'delete'")
         try:
-            return [(query.key, self._edit(operation, query.key, query.payload or b"", query.encoding))]
+            change = self._change(operation, query.key, query.payload or b"", query.encoding)
+            (result,) = self._registry.apply([change])
+            if isinstance(result, RegistryError):
+                raise result
         except (EditError, RegistryError) as error:
-            self._reject(query.key, str(error), now_ns)
-            raise Refused(str(error)) from None
-
-    def _edit(self, operation: str, key: str, payload: bytes, encoding: str) -> Poi:
-        if operation == "delete":
-            poi = self._registry.delete(poi_id_of(key))
-        else:
-            poi = read_poi(key, payload, encoding)
-            self._registry.put(poi)
+            raise Refused(self._reject(query.key, str(error), now_ns)) from None
         self.accepted += 1
-        return poi
+        self._announce(result.poi_id, None if isinstance(change, Delete) else result)
+        return [(query.key, result)]
 
-    def _reject(self, key: str, reason: str, now_ns: int) -> None:
+    def _change(self, operation: str, key: str, payload: bytes, encoding: str) -> Change:
+        poi_id = poi_id_of(self._prefix, key)
+        return Delete(poi_id) if operation == "delete" else Put(read_poi(poi_id, payload, encoding))
+
+    def _reject(self, key: str, reason: str, now_ns: int) -> str:
         self.rejected += 1
-        self.rejections.append(RejectedEdit(key=key[:2000], reason=reason[:2000], stamp_ns=now_ns))
+        self.rejections.append(RejectedEdit(key=key[:MAX_TEXT], reason=reason[:MAX_TEXT], stamp_ns=now_ns))
+        return reason
+
+
+def poi_id_of(prefix: str, key: str) -> str:
+    """The id that is all there is after the prefix. Raises EditError where the key names no single POI."""
+    poi_id = key.removeprefix(prefix)
+    if not key.startswith(prefix) or not poi_id or any(mark in poi_id for mark in "/*$"):
+        raise EditError(f"key: '{key[:200]}' names no single POI")
+    return poi_id
+
+
+def read_poi(poi_id: str, payload: bytes, encoding: str) -> Poi:
+    """The POI that an edit puts under the key of `poi_id`, which is taken from there where it is absent.
+
+    Raises EditError.
+    """
+    try:
+        content = _content(payload, encoding)
+        poi = validate(Poi, {"poi_id": poi_id} | content)
+    except CodecError as error:
+        raise EditError(str(error)) from None
+    if poi.poi_id != poi_id:
+        raise EditError(f"poi_id: '{poi.poi_id}', but the key ends in '{poi_id}'")
+    return poi
+
+
+def _content(payload: bytes, encoding: str) -> dict[str, Any]:
+    base, _, schema = encoding.partition(";")
+    if base == MSGPACK:
+        _check_schema(schema)
+    elif base not in JSON_LABELS:
+        raise WrongType(f"encoding: '{encoding[:80]}' is neither {MSGPACK};Poi/{Poi.VERSION} nor application/json")
+    read = unpack if base == MSGPACK else parse_json
+    try:
+        return read(payload, max_bytes=MAX_BYTES)
+    except Malformed as error:
+        raise EditError(f"payload: {error}") from None
+
+
+def _check_schema(schema: str) -> None:
+    name, _, version = schema.partition("/")
+    if name != "Poi":
+        raise WrongType(f"encoding: '{schema[:80]}', expected 'Poi/{Poi.VERSION}'")
+    if version != str(Poi.VERSION):
+        raise WrongVersion(f"encoding: Poi version '{version[:20]}', this reader speaks {Poi.VERSION}")

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import re
 import sqlite3
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from deixis_schemas.codec import CodecError, decode_json
-from deixis_schemas.messages import MAX_POIS, Poi
+from deixis_schemas.messages import MAX_POIS, NAME_PATTERN, Poi
 
 FORMAT = 1
 BUSY_MS = 500
+MEMORY = ":memory:"
 
 SCHEMA = """
 CREATE TABLE pois (poi_id TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT ROWID;
@@ -22,29 +27,48 @@ class RegistryError(Exception):
     """The file cannot be used, or an edit cannot be done; the text names the file or the field."""
 
 
+@dataclass(frozen=True)
+class Put:
+    """Adds or replaces a POI."""
+
+    poi: Poi
+
+
+@dataclass(frozen=True)
+class Delete:
+    """Removes the POI of that id."""
+
+    poi_id: str
+
+
+Change = Put | Delete
+Statement = tuple[str, tuple[str, ...]]
+
+
 class Registry:
     """POIs by id, kept in memory and on disk.
 
-    Every edit is one transaction, committed and synced to disk before the call returns (write-ahead log, synchronous=FULL). The
-    file is locked as long as it is open: two registries on one file would each answer from a memory that the other does
-    not see.
+    Every call that edits is one transaction, committed and synced to disk before it returns (write-ahead log,
+    synchronous=FULL). The file is locked as long as it is open: two registries on one file would each answer from a memory
+    that the other does not see.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Open the file, or make it with its folder. Raises RegistryError where that fails."""
-        self.path = path
+    def __init__(self, path: Path | None) -> None:
+        """Open the file, or make it with its folder; without a path, in memory. Raises RegistryError where that fails."""
+        self.path = path or MEMORY
         self._pois: dict[str, Poi] = {}
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, timeout=BUSY_MS / 1000, isolation_level=None)
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(self.path, timeout=BUSY_MS / 1000, isolation_level=None)
         except (OSError, sqlite3.Error) as error:
-            raise RegistryError(f"registry {path}: cannot be opened: {error}") from None
+            raise RegistryError(f"registry {self.path}: cannot be opened: {error}") from None
         try:
             self._prepare()
             self._pois = self._load()
         except sqlite3.Error as error:
             self._db.close()
-            raise RegistryError(f"registry {path}: {_cause(error)}") from None
+            raise RegistryError(f"registry {self.path}: {_cause(error)}") from None
         except RegistryError:
             self._db.close()
             raise
@@ -57,21 +81,37 @@ class Registry:
         """The POI of that id."""
         return self._pois.get(poi_id)
 
+    def apply(self, changes: Sequence[Change]) -> list[Poi | RegistryError]:
+        """Make these changes in their order, as one transaction; on disk when this returns.
+
+        Returns for each the POI as it is, or as it was where it is deleted; or why it is refused, as all are where the disk
+        refuses.
+        """
+        after, statements, results = dict(self._pois), list[Statement](), list[Poi | RegistryError]()
+        for change in changes:
+            try:
+                result, statement = _put(after, change.poi) if isinstance(change, Put) else _delete(after, change.poi_id)
+            except RegistryError as error:
+                results.append(error)
+            else:
+                results.append(result)
+                statements.append(statement)
+        if not statements:
+            return results
+        try:
+            self._commit(statements)
+        except RegistryError as error:
+            return [error] * len(results)
+        self._pois = after
+        return results
+
     def put(self, poi: Poi) -> None:
         """Add or replace a POI; on disk when this returns. Raises RegistryError."""
-        if poi.poi_id not in self._pois and len(self._pois) >= MAX_POIS:
-            raise RegistryError(f"poi_id: the registry is full, it holds {MAX_POIS} POIs")
-        self._commit([("INSERT OR REPLACE INTO pois VALUES (?, ?)", (poi.poi_id, poi.model_dump_json()))])
-        self._pois[poi.poi_id] = poi
+        self._apply_one(Put(poi))
 
     def delete(self, poi_id: str) -> Poi:
         """Remove a POI; gone from disk when this returns. Returns what it was. Raises RegistryError for an unknown id."""
-        poi = self._pois.get(poi_id)
-        if poi is None:
-            raise RegistryError(f"poi_id: there is no POI '{poi_id}'")
-        self._commit([("DELETE FROM pois WHERE poi_id = ?", (poi_id,))])
-        del self._pois[poi_id]
-        return poi
+        return self._apply_one(Delete(poi_id))
 
     def apply_site(self, site: Sequence[Poi]) -> list[str]:
         """Apply what changed in the site file since it was last applied; returns the ids touched.
@@ -87,7 +127,7 @@ class Registry:
         after = (set(self._pois) | set(changed)) - set(gone)
         if len(after) > MAX_POIS:
             raise RegistryError(f"registry {self.path}: with the site's POIs it would hold {len(after)}, at most {MAX_POIS}")
-        statements: list[tuple[str, tuple[str, ...]]] = []
+        statements: list[Statement] = []
         for poi_id in changed:
             content = wanted[poi_id].model_dump_json()
             statements += [
@@ -104,6 +144,12 @@ class Registry:
     def close(self) -> None:
         """Close the file."""
         self._db.close()
+
+    def _apply_one(self, change: Change) -> Poi:
+        (result,) = self.apply([change])
+        if isinstance(result, RegistryError):
+            raise result
+        return result
 
     def _prepare(self) -> None:
         # Exclusive first: WAL then needs no shared-memory file, and a second process is refused at once.
@@ -144,7 +190,7 @@ class Registry:
                 raise RegistryError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
         return pois
 
-    def _commit(self, statements: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+    def _commit(self, statements: Sequence[Statement]) -> None:
         """Run these as one transaction. Raises RegistryError, and then nothing is changed."""
         try:
             self._db.execute("BEGIN IMMEDIATE")
@@ -155,6 +201,34 @@ class Registry:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
             raise RegistryError(f"registry {self.path}: not written: {_cause(error)}") from None
+
+
+def default_path(robot: str, site: Path) -> Path:
+    """Where the registry is when no setting says so: one file for each robot and site file, in the user's state folder.
+
+    By the XDG base directories. Raises RegistryError for a robot whose name is none.
+    """
+    # Names are checked where they are given; a part of a path is checked where it becomes one.
+    if not re.fullmatch(NAME_PATTERN, robot):
+        raise RegistryError(f"registry: the robot's name '{robot[:80]}' cannot name a folder")
+    base = os.environ.get("XDG_STATE_HOME") or ""
+    state = Path(base) if os.path.isabs(base) else Path.home() / ".local" / "state"
+    resolved = site.resolve()
+    digest = hashlib.sha256(str(resolved).encode()).hexdigest()[:8]
+    return state / "deixis" / robot / f"{resolved.stem}-{digest}.sqlite"
+
+
+def _put(pois: dict[str, Poi], poi: Poi) -> tuple[Poi, Statement]:
+    if poi.poi_id not in pois and len(pois) >= MAX_POIS:
+        raise RegistryError(f"poi_id: the registry is full, it holds {MAX_POIS} POIs")
+    pois[poi.poi_id] = poi
+    return poi, ("INSERT OR REPLACE INTO pois VALUES (?, ?)", (poi.poi_id, poi.model_dump_json()))
+
+
+def _delete(pois: dict[str, Poi], poi_id: str) -> tuple[Poi, Statement]:
+    if poi_id not in pois:
+        raise RegistryError(f"poi_id: there is no POI '{poi_id[:80]}'")
+    return pois.pop(poi_id), ("DELETE FROM pois WHERE poi_id = ?", (poi_id,))
 
 
 def _cause(error: sqlite3.Error) -> str:

@@ -1,13 +1,15 @@
-"""How fusion sees the stages that it listens to: alive, late, of a wrong version, or two of them on one key."""
+"""How fusion sees those that it listens to: alive, late, of a wrong version, or two of them on one key; and when they end."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from deixis_schemas.messages import SourceState, SourceStatus
+from deixis_schemas.messages import MAX_TEXT, CameraInfo, FrameId, SourceState, SourceStatus
 
 MAX_PRODUCERS = 8
+# The last frames of a source may be lost on the way (newest wins): then its end is believed after this.
+GRACE_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -44,18 +46,16 @@ class SourceMonitor:
                 self._rejected_s[reading.stage] = now_s
             self._readings[reading.stage] = reading
 
-    def status(self, stage: str, answered: bool | None = None) -> tuple[SourceStatus, str]:
-        """Status of a stage and why it is not ok. `answered`: whether it answered the frame in question, none for no frame."""
+    def status(self, stage: str, *, missed: bool = False) -> tuple[SourceStatus, str]:
+        """Status of a stage and why it is not ok. `missed`: it did not answer the frame in question."""
         reading = self._readings[stage]
-        if answered:
-            return "ok", ""
         if self._refused_lately(reading):
             kind: SourceStatus = "wrong_version" if reading.last_error_kind == "wrong_version" else "late"
             return kind, f"its messages are refused: {reading.last_error}"
         silent = reading.age_s is None or reading.age_s > self._dead_after_s
         if silent and not reading.alive:
             return "dead", "no such process is alive" if reading.age_s is None else f"gone, silent for {reading.age_s:.1f} s"
-        if answered is False:
+        if missed:
             return "late", "did not answer this frame in time"
         if silent and reading.age_s is None:
             return "late", "alive, but has sent nothing yet"
@@ -77,10 +77,6 @@ class SourceMonitor:
             if len(reading.producers) > 1
         ]
 
-    def producers(self, stage: str) -> tuple[str, ...]:
-        """The processes heard lately on the stage's key, as `stage/instance`."""
-        return self._readings[stage].producers
-
     def _state(self, reading: Reading) -> SourceState:
         status, reason = self.status(reading.stage)
         double = next((text for text in self.doubled() if f" of {reading.stage}:" in text), "")
@@ -91,10 +87,47 @@ class SourceMonitor:
             age_s=reading.age_s,
             received=reading.received,
             rejected=reading.rejected,
-            reason="; ".join(part for part in (reason, double) if part),
+            reason="; ".join(part for part in (reason, double) if part)[:MAX_TEXT],
         )
 
     def _refused_lately(self, reading: Reading) -> bool:
         """Whether what it sent last was refused, and that not long ago; an accepted message clears `last_error_kind`."""
         at_s = self._rejected_s.get(reading.stage)
         return at_s is not None and bool(reading.last_error_kind) and self._now_s - at_s <= self._dead_after_s
+
+
+class SourceEnd:
+    """Watches the camera's word and the flow of answered frames; `now_s` is monotonic."""
+
+    def __init__(self, silent_s: float) -> None:
+        self._silent_s = silent_s
+        self._ended: CameraInfo | None = None
+        self._ended_s = 0.0
+        self._answered_s: float | None = None
+        self._answered: FrameId | None = None
+
+    def hear(self, info: CameraInfo, now_s: float) -> None:
+        """The camera says how it is; it repeats that every few seconds."""
+        if info.state != "ended":
+            self._ended = None
+        elif self._ended is None:
+            self._ended, self._ended_s = info, now_s
+
+    def answered(self, frame_id: FrameId, now_s: float) -> None:
+        """A frame was answered."""
+        self._answered_s, self._answered = now_s, frame_id
+
+    def is_over(self, now_s: float, waits: bool) -> bool:
+        """Whether no frame is to come any more; true once, until the next frame is answered.
+
+        `waits`: a live camera may hold its next frame back, as in lockstep, so that silence alone means nothing.
+        """
+        if self._answered_s is None:
+            return False
+        last_seen = self._ended is not None and self._answered == FrameId(self._ended.run, self._ended.last_seq)
+        ended = self._ended is not None and (last_seen or now_s - self._ended_s > GRACE_S)
+        silent = not waits and now_s - self._answered_s > self._silent_s
+        if not (ended or silent):
+            return False
+        self._answered_s, self._answered = None, None
+        return True

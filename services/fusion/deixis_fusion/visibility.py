@@ -1,12 +1,39 @@
-"""Which points of the map a person can see: walls as segments in the plane (the paper's rooms, section 7.2)."""
+"""The frame of discernment X (eq. 10): the POIs that a person can see, each with its bearing.
+
+Walls are segments in the plane (the paper's rooms, section 7.2).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+from deixis_schemas.messages import Poi
+
+from .localisation import PersonPlace, bearing_with_sigma_deg
 
 Point2 = tuple[float, float]
 Wall = tuple[Point2, Point2]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A POI that the person may mean. The bearing is at the person, positive toward the person's own left; degrees."""
+
+    poi: Poi
+    bearing_deg: float
+    bearing_sigma_deg: float
+
+
+def frame_of_discernment(place: PersonPlace, pois: Sequence[Poi], walls: Sequence[Wall], clearance_m: float) -> list[Candidate]:
+    """Those of the POIs that are in sight of a person, in their order."""
+    eye = (place.position_m[0], place.position_m[1])
+    return [
+        Candidate(poi, *bearing_with_sigma_deg(place, poi.position_m, poi.extent_m))
+        for poi in pois
+        if sees(eye, (poi.position_m[0], poi.position_m[1]), walls, clearance_m)
+    ]
 
 
 def sees(eye: Point2, target: Point2, walls: Sequence[Wall], clearance_m: float = 0.15) -> bool:
