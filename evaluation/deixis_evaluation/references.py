@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import msgpack
-from deixis_schemas.codec import CodecError, decode_any, encoding_of
+from deixis_schemas.codec import CodecError, decode_any, encode, encoding_of
 from deixis_schemas.messages import Message
 
 from .clips import Clip, ClipError, load_clips
@@ -79,10 +79,7 @@ def _path(folder: Path, clip: str, stage: str) -> Path:
 
 
 def _pack(messages: Sequence[Message]) -> bytes:
-    # Single precision: half the bytes, and below every tolerance.
-    return bytes(
-        msgpack.packb([(encoding_of(type(m)), msgpack.packb(m.model_dump(), use_single_float=True)) for m in messages])
-    )
+    return bytes(msgpack.packb([(encoding_of(type(message)), encode(message)) for message in messages]))
 
 
 def main() -> int:
