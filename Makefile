@@ -9,7 +9,7 @@ DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headp
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract clean
+.PHONY: setup demo test check bench contract references clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -42,6 +42,10 @@ bench: setup
 # After a change of messages or topics: JSON Schema, golden bytes and the topic table
 contract: setup
 	@$(BIN)/python -m deixis_schemas.export schemas/contract
+
+# After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
+references: setup
+	@$(BIN)/python -m deixis_evaluation.references examples/clips tests/replay/references
 
 clean:
 	rm -rf .venv build dist

@@ -12,11 +12,17 @@ SHARED = ROOT.parent / "shared"
 
 
 @pytest.fixture(scope="session")
+def clips():
+    """Folder of the labelled clips that ship with the project."""
+    return ROOT / "examples" / "clips"
+
+
+@pytest.fixture(scope="session")
 def rendered():
-    """Folder of the labelled clips; not at a user's."""
+    """Folder of the whole labelled set; not at a user's."""
     folder = SHARED / "data" / "rendered"
     if not folder.is_dir():
-        pytest.skip("the labelled clips (../shared/data/rendered) are not on this machine")
+        pytest.skip("the whole labelled set (../shared/data/rendered) is not here; the shipped clips stand for it")
     return folder
 
 

@@ -10,17 +10,17 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.codec import say
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 MAX_LABEL_BYTES = 64 << 20
-FACE_WIDTH_M = 0.16
-"""Width that a face has in the picture when seen from the front, for distances in face widths."""
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 Point = tuple[Number, Number]
 Box = tuple[Number, Number, Number, Number]
 Vector = tuple[Number, Number, Number]
+Matrix = tuple[float, float, float, float, float, float, float, float, float]
 TruthPhase = Literal["none", "preparation", "stroke", "retraction"]
 SideName = Literal["left", "right"]
 
@@ -137,6 +137,17 @@ class TrueCamera(_Label):
         if math.hypot(self.R_world_to_cam[6], self.R_world_to_cam[8]) < 1e-3:
             raise ValueError("R_world_to_cam: the camera looks straight up or down; it has no forward direction")
         return self
+
+    @property
+    def matrix(self) -> Matrix:
+        """K, row-major."""
+        (a, b, c), (d, e, f), (g, h, i) = self.K
+        return a, b, c, d, e, f, g, h, i
+
+    @property
+    def distortion_model(self) -> Literal["plumb_bob", "rational_polynomial"]:
+        """What the coefficients in `dist` are, as ROS names it."""
+        return "plumb_bob" if len(self.dist) <= 5 else "rational_polynomial"
 
 
 class TruePoi(_Label):

@@ -60,9 +60,8 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
             recording = read_recording(out / f"{clip.name}.jsonl")
         except RecordingError as error:
             return failed_clip(clip.name, clip.truth, str(error))
-    if recording.restarted:
-        # What was half seen twice is not what the stage would have answered.
-        return failed_clip(clip.name, clip.truth, f"restarted while the clip was played: {', '.join(recording.restarted)}")
+    if recording.interruption is not None:
+        return failed_clip(clip.name, clip.truth, recording.interruption)
     return score_clip(clip.name, clip.truth, recording, lockstep=options.lockstep)
 
 

@@ -16,6 +16,7 @@ from deixis_schemas.messages import (
     HeadPoses,
     Health,
     Message,
+    OfFrame,
     Target,
     Track,
     Tracks,
@@ -29,12 +30,13 @@ class RecordingError(ValueError):
 
 @dataclass
 class Recording:
-    """Messages by the `seq` of their frame, which is the frame's index in the clip.
+    """Messages by the `seq` of their frame, which within one run is the frame's index in the clip.
 
-    frame_ns, belief_ns: when frame and belief were received, Unix ns. stamps_ns: the frames' own stamps. targets: final ones.
-    pids: processes that each stage has had.
+    runs: those of the camera that were heard; a clip is played in one. frame_ns, belief_ns: when frame and belief were
+    received, Unix ns. stamps_ns: the frames' own stamps. targets: final ones. pids: processes that each stage has had.
     """
 
+    runs: set[int] = field(default_factory=set)
     frame_ns: dict[int, int] = field(default_factory=dict)
     belief_ns: dict[int, int] = field(default_factory=dict)
     stamps_ns: dict[int, int] = field(default_factory=dict)
@@ -47,6 +49,8 @@ class Recording:
 
     def add(self, message: Message, received_ns: int) -> None:
         """Sort in one message; of no interest are those that speak of no frame, and updates of targets."""
+        if isinstance(message, OfFrame):
+            self.runs.add(message.run)
         if isinstance(message, Tracks):
             self.tracks[message.seq] = message
         elif isinstance(message, HeadPoses):
@@ -63,12 +67,16 @@ class Recording:
             self.pids.setdefault(message.stage, set()).add(message.pid)
 
     @property
-    def restarted(self) -> list[str]:
-        """Stages that ended and were started again."""
-        return sorted(stage for stage, pids in self.pids.items() if len(pids) > 1)
+    def interruption(self) -> str | None:
+        """Why this is not one playing of the clip: what was half seen twice is not what the stages would have answered."""
+        restarted = sorted(stage for stage, pids in self.pids.items() if len(pids) > 1)
+        if restarted:
+            return f"restarted while the clip was played: {', '.join(restarted)}"
+        return f"the camera began {len(self.runs)} runs of the clip" if len(self.runs) > 1 else None
 
-    def add_frame(self, seq: int, stamp_ns: int, received_ns: int) -> None:
+    def add_frame(self, run: int, seq: int, stamp_ns: int, received_ns: int) -> None:
         """Note that a frame was published."""
+        self.runs.add(run)
         self.frame_ns[seq] = received_ns
         self.stamps_ns[seq] = stamp_ns
 
@@ -114,7 +122,7 @@ def _read_line(recording: Recording, line: str, where: str) -> None:
     try:
         entry: dict[str, Any] = json.loads(line)
         if entry["type"] == Frame.__name__:
-            recording.add_frame(entry["seq"], entry["stamp_ns"], entry["received_ns"])
+            recording.add_frame(entry["message"]["run"], entry["seq"], entry["stamp_ns"], entry["received_ns"])
         elif entry["type"] in SCORED:
             message = SCORED[entry["type"]].model_validate_json(json.dumps(entry["message"]))
             recording.add(message, entry["received_ns"])

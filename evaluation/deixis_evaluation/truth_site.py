@@ -48,15 +48,14 @@ def site_content(clip: Clip, registry: Path) -> dict[str, Any]:
 def calibration_content(clip: Clip) -> dict[str, Any]:
     """A ROS camera_info mapping with the clip's intrinsics."""
     meta = clip.truth.meta
-    matrix = [value for row in meta.camera.K for value in row]
     distortion = list(meta.camera.dist) or [0.0] * 5
     projection = [value for row in meta.camera.K for value in (*row, 0.0)]
     return {
         "image_width": meta.width,
         "image_height": meta.height,
         "camera_name": clip.name,
-        "camera_matrix": {"rows": 3, "cols": 3, "data": matrix},
-        "distortion_model": "plumb_bob" if len(distortion) <= 5 else "rational_polynomial",
+        "camera_matrix": {"rows": 3, "cols": 3, "data": list(meta.camera.matrix)},
+        "distortion_model": meta.camera.distortion_model,
         "distortion_coefficients": {"rows": 1, "cols": len(distortion), "data": distortion},
         "rectification_matrix": {"rows": 3, "cols": 3, "data": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]},
         "projection_matrix": {"rows": 3, "cols": 4, "data": projection},

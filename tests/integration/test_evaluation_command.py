@@ -1,4 +1,4 @@
-"""`deixis eval` as a command: real processes on labelled clips made here, and on the rendered ones where they are."""
+"""`deixis eval` as a command: real processes on labelled clips made here, and on one that ships."""
 
 import json
 import subprocess
@@ -10,8 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-RENDERED = ROOT.parent / "shared" / "data" / "rendered"
 DEIXIS = Path(sys.executable).parent / "deixis"
 FRAMES = 12
 
@@ -109,11 +107,11 @@ def outputs(path: Path) -> list[Any]:
     return sorted(kept, key=lambda entry: order[entry["key"]])
 
 
-@pytest.mark.skipif(not (RENDERED / "c05_point_m45.mp4").exists(), reason="the rendered clips are not on this machine")
-def test_two_lockstep_runs_of_a_rendered_clip_give_equal_outputs(tmp_path: Path) -> None:
+def test_two_lockstep_runs_of_a_clip_give_equal_outputs(tmp_path: Path, clips: Path) -> None:
     for run in ("first", "second"):
-        done = evaluate(RENDERED, "--lockstep", "--only-clips", "c05_*", "--out", tmp_path / run)
+        done = evaluate(clips, "--lockstep", "--only-clips", "small", "--out", tmp_path / run)
         assert done.returncode == 0, done.stderr
-    first, second = (outputs(tmp_path / run / "c05_point_m45.jsonl") for run in ("first", "second"))
-    assert sum(entry["type"] == "Belief" for entry in first) == 126
+    first, second = (outputs(tmp_path / run / "small.jsonl") for run in ("first", "second"))
+    assert sum(entry["type"] == "Belief" for entry in first) == 63
+    assert sum(entry["type"] == "Target" and entry["message"]["final"] for entry in first) == 1
     assert first == second

@@ -12,6 +12,7 @@ from deixis_evaluation.recording import Recording, RecordingError, read_recordin
 from deixis_evaluation.report import report
 from deixis_evaluation.summary import summarise
 from deixis_evaluation.table import print_scores
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import Belief, Gestures, HeadPoses, Target, Tracks
 from rich.console import Console
 
@@ -60,7 +61,7 @@ def _person(number: int, *, stroke: bool, azimuth: float, yaw: float) -> dict[st
 
 
 def head(seq: int) -> dict[str, Any]:
-    return {"seq": seq, "stamp_ns": EPOCH_NS + seq * FRAME_NS, "stage": "test", "instance": "t"}
+    return {"run": 1, "seq": seq, "stamp_ns": EPOCH_NS + seq * FRAME_NS, "stage": "test", "instance": "t"}
 
 
 def track(kind: str, x: float, y: float, person: int | None = 0, number: int = 1) -> dict[str, Any]:
@@ -80,7 +81,7 @@ def recording(frames: range = range(60), **content: Any) -> Recording:
     made = Recording()
     for seq in frames:
         received = EPOCH_NS + seq * FRAME_NS
-        made.add_frame(seq, EPOCH_NS + seq * FRAME_NS, received + 1_000_000)
+        made.add_frame(1, seq, EPOCH_NS + seq * FRAME_NS, received + 1_000_000)
         tracks = content.get("tracks", [track("face", 200, 200)])
         made.add(Tracks(**head(seq), width=640, height=480, tracks=tracks), received)
         made.add(HeadPoses(**head(seq), poses=content.get("poses", [])), received)
@@ -279,7 +280,7 @@ def test_a_recording_is_read_back_from_its_lines(tmp_path: Path) -> None:
     for message in (shown, target(1, 4, "P1"), target(1, 4, final=False)):
         entry = {"key": "k", "type": type(message).__name__, "received_ns": 5, "message": json.loads(message.model_dump_json())}
         lines.append(json.dumps(entry))
-    lines.append(json.dumps({"key": "k", "type": "Frame", "seq": 4, "stamp_ns": 8, "received_ns": 9, "message": {}}))
+    lines.append(json.dumps({"key": "k", "type": "Frame", "seq": 4, "stamp_ns": 8, "received_ns": 9, "message": {"run": 1}}))
     lines.append(json.dumps({"key": "k", "type": "CameraInfo", "received_ns": 9, "message": {"of": "no interest"}}))
     for stage, pid in (("fusion", 5), ("tracker", 6), ("fusion", 7)):
         beat = {"stamp_ns": 1, "stage": stage, "instance": "t", "count": 1, "state": "ok", "pid": pid, "host": "h"}
@@ -291,7 +292,19 @@ def test_a_recording_is_read_back_from_its_lines(tmp_path: Path) -> None:
     assert read.tracks[4] == shown
     assert [item.poi_ids for item in read.targets] == [["P1"]]
     assert read.frame_ns == {4: 9}
-    assert read.restarted == ["fusion"]
+    assert read.interruption == "restarted while the clip was played: fusion"
+
+
+def test_two_passes_through_a_clip_are_not_scored_as_one() -> None:
+    heard = recording()
+    assert heard.interruption is None
+    heard.add_frame(2, 0, EPOCH_NS, EPOCH_NS)
+    assert heard.interruption == "the camera began 2 runs of the clip"
+
+
+def test_face_widths_are_those_of_the_contract() -> None:
+    clip = truth()
+    assert clip.face_width_px(clip.frames[0].persons[0]) == pytest.approx(500 * FACE_WIDTH_M / 3.2)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from deixis_evaluation.clips import TrueCamera
+from deixis_evaluation.truth_site import map_position
 from deixis_fusion.config import PlaceConfig
 from deixis_fusion.localisation import (
     Camera,
@@ -30,8 +32,8 @@ from deixis_schemas.messages import CameraInfo, CameraMount, Poi, Track
 from hypothesis import given
 from hypothesis import strategies as st
 
-RENDERED = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "rendered"
-CLIPS = ("a02_point_m60", "c02_point_m110", "c08_point_p20", "c14_point_p130", "k07_point_p50_gain70", "a10_two_people")
+SHIPPED = Path(__file__).resolve().parents[2] / "examples" / "clips"
+CLIPS = ("pointing", "small", "two_persons")
 K = (560.0, 0.0, 319.5, 0.0, 560.0, 239.5, 0.0, 0.0, 1.0)
 angles = st.floats(-179, 179)
 metres = st.floats(-20, 20)
@@ -200,42 +202,23 @@ def test_the_frame_of_discernment_holds_the_visible_pois_in_their_order() -> Non
     assert [candidate.poi.poi_id for candidate in found] == ["a", "c"]
 
 
-# --- the rendered clips' truth ----------------------------------------------------------------------------------------
-
-
-def load_truth(name: str) -> dict[str, Any]:
-    path = RENDERED / f"{name}.json"
-    if not path.is_file():
-        pytest.skip("the rendered clips with exact truth are not on this machine")
-    content: dict[str, Any] = json.loads(path.read_text())
-    return content
-
-
-def camera_of(truth: dict[str, Any]) -> tuple[Camera, np.ndarray]:
-    given_camera = truth["meta"]["camera"]
-    rotation = np.array(given_camera["R_world_to_cam"], float).reshape(3, 3)
-    centre = -rotation.T @ np.array(given_camera["t_world_to_cam"])
-    mount = CameraMount(position_m=(0.0, 0.0, float(centre[1])), pitch_up_deg=given_camera["pitch_up_deg"])
-    matrix = tuple(float(value) for row in given_camera["K"] for value in row)
-    return camera(camera_matrix=matrix, mount=mount), centre
-
-
-def to_map(world: list[float], centre: np.ndarray) -> tuple[float, float, float]:
-    """World (X image right, Y up, Z toward the camera) to a map whose origin is the camera's foot, x forward."""
-    return float(centre[2] - world[2]), float(centre[0] - world[0]), float(world[1])
+# --- the shipped clips' truth -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", CLIPS)
-def test_bearings_of_the_rendered_pois_match_the_truth_within_a_degree(name: str) -> None:
-    truth = load_truth(name)
-    info, centre = camera_of(truth)
-    pois = {poi["id"]: to_map(poi["xyz_world"], centre) for poi in truth["meta"]["pois"]}
+def test_bearings_of_the_pois_of_a_clip_match_its_truth_within_a_degree(name: str) -> None:
+    truth = json.loads((SHIPPED / f"{name}.json").read_text())
+    meta, lens = truth["meta"], TrueCamera.model_validate(truth["meta"]["camera"])
+    mount = CameraMount(position_m=(0.0, 0.0, lens.height_m), pitch_up_deg=lens.pitch_up_deg)
+    size = (meta["width"], meta["height"])
+    info = camera(camera_matrix=lens.matrix, mount=mount, width=size[0], height=size[1])
+    pois = {poi["id"]: map_position(lens, poi["xyz_world"]) for poi in meta["pois"]}
     errors = []
     for frame in truth["frames"]:
         for person in frame["persons"]:
             if person["phase"] != "stroke":
                 continue
-            head = HeadSighting(tuple(person["head"]["center_px"]), (640, 480), person["head"]["center_cam"][2])
+            head = HeadSighting(tuple(person["head"]["center_px"]), size, person["head"]["center_cam"][2])
             found = locate(info, RobotPlace(), head, 0.05)
             assert found.position_m[:2] == pytest.approx(person["user_pos"]["robot_xy"], abs=0.03)
             errors.append(abs(bearing_deg(found, pois[person["poi"]]) - person["poi_azimuth_deg"]))
