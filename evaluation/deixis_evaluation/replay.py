@@ -20,6 +20,7 @@ from deixis_gesture.config import GestureConfig
 from deixis_gesture.recognizer import GestureRecognizer
 from deixis_headpose.config import HeadposeConfig
 from deixis_headpose.estimator import HeadPoseEstimator
+from deixis_runtime.lens import Lens
 from deixis_schemas.messages import (
     CameraInfo,
     CameraMount,
@@ -115,9 +116,9 @@ def replay_tracker(given: Given) -> Sequence[Message]:
 def replay_headpose(given: Given) -> Sequence[Message]:
     """Pictures and Tracks to HeadPoses."""
     producer, estimator = Producer("headpose", INSTANCE), HeadPoseEstimator(HeadposeConfig())
-    made = []
+    lens, made = Lens.of(given.camera()), []
     for (frame, picture), seen in zip(given.pictures(), given.of(Tracks), strict=True):
-        poses = estimator.update(picture, seen.tracks, frame.run, frame.stamp_ns)
+        poses = estimator.update(picture, seen.tracks, lens, frame.run, frame.stamp_ns)
         made.append(HeadPoses.derive(frame, producer, poses=poses))
     return made
 
@@ -125,9 +126,9 @@ def replay_headpose(given: Given) -> Sequence[Message]:
 def replay_gesture(given: Given) -> Sequence[Message]:
     """Tracks to Gestures."""
     producer, recognizer = Producer("gesture", INSTANCE), GestureRecognizer(GestureConfig())
-    made = []
+    lens, made = Lens.of(given.camera()), []
     for seen in given.of(Tracks):
-        gestures = recognizer.update(seen.tracks, seen.width, seen.height, seen.run, seen.stamp_ns)
+        gestures = recognizer.update(seen.tracks, seen.width, seen.height, lens, seen.run, seen.stamp_ns)
         made.append(Gestures.derive(seen, producer, gestures=gestures))
     return made
 
@@ -137,7 +138,7 @@ def replay_fusion(given: Given) -> Sequence[Message]:
     fusion = Fusion(FusionConfig(), Producer("fusion", INSTANCE))
     fusion.set_pois(given.pois())
     fusion.set_camera(given.camera())
-    fusion.set_robot(RobotPlace())
+    fusion.start_robot_at(RobotPlace())
     made: list[Message] = []
     for tracks, poses, gestures in zip(given.of(Tracks), given.of(HeadPoses), given.of(Gestures), strict=True):
         belief, targets = fusion.answer(JoinedFrame(tracks, poses, gestures), {}, None)
