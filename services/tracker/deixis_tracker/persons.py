@@ -55,13 +55,14 @@ class Person:
     motion: PointFilter
     width: float
     colours: HeadColours
+    since_ns: int
     seen_ns: int
     face_ns: int  # when its face was seen from the front and uncovered last
-    fresh_ns: int  # since when it is to be seen there, or known
+    back_ns: int = -(10**18)  # when it was seen so again, after it was turned away or covered
     support: float = 1.0
     observed: bool = True
     sightings: int = 1  # of a frontal face, that corrected the head
-    measured: int = 0  # times since then
+    measured: int = 0  # times
     frontal: FrontalFace | None = None  # as measured in this frame, in its pixels
     skin_centre: tuple[float, float] | None = None
     hands: list[HandTrack] = field(default_factory=list)
