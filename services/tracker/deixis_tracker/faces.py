@@ -75,7 +75,7 @@ def measure(frame: Image, seen: Box) -> FrontalFace | None:
 
 def _find(frame: Image, face: _Found, at_px: float) -> list[_Found]:
     """The face again, with its box scaled to `at_px`; none where it is not seen so."""
-    side, scale = round(1.7 * face.width), at_px / face.width
+    side, scale = round(1.5 * face.width), at_px / face.width
     left, top = max(0, round(face.x - side / 2)), max(0, round(face.y - side / 2))
     cut = frame[top : top + side, left : left + side]
     least, most = round(0.8 * at_px), round(1.25 * at_px)

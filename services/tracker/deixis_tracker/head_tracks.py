@@ -31,7 +31,7 @@ LOOK_S, STAGGERED_S = 1 / 6, 1 / 30  # persons are looked at in different frames
 # Measuring a face takes longer than all else in a frame, and who estimates head poses needs it when a head begins. A face that
 # was turned away or covered may still be turning: measured in each frame, it would agree with itself.
 MEASURE_S, MEASURE_BACK_S = 0.8, 0.1
-AWAY_S, BACK_FOR_S = 0.3, 1.0
+AWAY_S, BACK_FOR_S = 0.3, 0.5
 NEW_FOR_S, NEW_SIGHTINGS = 0.5, 5  # a new face is measured in each frame
 LEARN_COLOURS_S = 1 / 15
 SKIN_FROM_EVERY = 3  # sightings of the face
