@@ -6,15 +6,13 @@ import pytest
 from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_tracker.background import Background
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.frame import Step, Views, coarsened
 from deixis_tracker.head_tracks import HeadTracks
 from deixis_tracker.heads import HeadColours
 from deixis_tracker.kalman import PointFilter
-from deixis_tracker.messages import tracks_of
-from deixis_tracker.persons import Person
-from deixis_tracker.seconds import Step
+from deixis_tracker.persons import Person, tracks_of
 from deixis_tracker.skin import SkinModel
 from deixis_tracker.tracker import Tracker
-from deixis_tracker.views import Views, coarsened
 
 PERIOD_NS = 33_333_333
 

@@ -13,14 +13,12 @@ import numpy as np
 
 from deixis_tracker.background import Background
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.faces import look, measure
-from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder
+from deixis_tracker.faces import FaceSearch, look, measure
+from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around, repeated, to_frame
+from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder, Walkers, silhouette_heads
 from deixis_tracker.kalman import PointFilter
-from deixis_tracker.newcomers import FaceSearch, Walkers, silhouette_heads
 from deixis_tracker.persons import Person
-from deixis_tracker.seconds import Step, repeated
 from deixis_tracker.skin import SkinModel
-from deixis_tracker.views import COARSE, Box, Image, Mask, Views, around, to_frame
 
 HEAD_ACCELERATION = 25.0  # head widths per second squared
 UNSEEN_SPEED_KEPT = 0.8**30  # of a head that is not seen, per second: it is not flown out of the picture
@@ -153,23 +151,23 @@ class HeadTracks:
         self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, HEAD_PER_BOX * c.width)]
         for face in self._search.confirmed(views, step):
             width = HEAD_PER_BOX * face.width
-            person = self._add(face.x, face.y, width, -BOX_BELOW_HEAD * width, views, room, step)
+            person = self._add(face.x, face.y - BOX_BELOW_HEAD * width, width, views, room, step)
             if person is not None:
                 _learn_skin(person, views.full, skin)
 
     def _find_walkers(self, views: Views, room: Background, people: Mask, step: Step) -> None:
         heads = [] if room.unstable else silhouette_heads(views.changed, views.skin, people)
         for head in self._walkers.believed(heads, step):
-            self._add(head.x, head.y, head.width, 0.0, views, room, step)
+            self._add(head.x, head.y, head.width, views, room, step)
 
-    def _add(self, x: float, y: float, width: float, up: float, views: Views, room: Background, step: Step) -> Person | None:
-        """A new person whose head was found at (x, y) and has its centre `up` pixels from there; None where it is not new."""
+    def _add(self, x: float, y: float, width: float, views: Views, room: Background, step: Step) -> Person | None:
+        """A new person whose head was found with its centre at (x, y); None where it is not new, or one too many."""
         if self._is_known(x, y, width):
             return None
         if len(self.persons) >= self._config.max_persons:
             self.left_out += 1
             return None
-        motion = PointFilter(x, y + up, 0.1 * width, HEAD_ACCELERATION * width)
+        motion = PointFilter(x, y, 0.1 * width, HEAD_ACCELERATION * width)
         now_ns = step.now_ns
         person = Person(next(self._person_ids), next(self._ids), motion, width, HeadColours(), now_ns, now_ns, now_ns)
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
