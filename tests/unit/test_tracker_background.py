@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 from deixis_tracker.background import Background, MotionHistory
-from deixis_tracker.seconds import Step
-from deixis_tracker.views import Box
+from deixis_tracker.frame import Box, Step
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.newcomers import plan_jobs
+from deixis_tracker.faces import plan_jobs
 from deixis_tracker.tracker import FrameRefused, Tracker
 from pydantic import ValidationError
 

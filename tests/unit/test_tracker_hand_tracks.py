@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.frame import Step, Views, coarsened
 from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.heads import HeadColours
 from deixis_tracker.hypotheses import sample_pixels
 from deixis_tracker.kalman import PointFilter
-from deixis_tracker.messages import tracks_of
-from deixis_tracker.persons import HandTrack, Person
-from deixis_tracker.seconds import Step
+from deixis_tracker.persons import HandTrack, Person, tracks_of
 from deixis_tracker.segmentation import Blob, hand_blobs
 from deixis_tracker.skin import SkinModel
-from deixis_tracker.views import Views, coarsened
 
 STEP = Step(1_033_333_333, 1_033_333_333, 33_333_333)
 SKIN, WALL = (90, 120, 190), (200, 150, 110)

@@ -11,8 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from deixis_tracker.seconds import Step, repeated
-from deixis_tracker.views import Box, Image, Mask
+from deixis_tracker.frame import Box, Image, Mask, Step, repeated
 
 UPDATE_S = 0.1
 STEADY_RATE, CHANGED_RATE = 0.1, 0.02  # of learning, per update

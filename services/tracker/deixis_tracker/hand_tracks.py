@@ -9,12 +9,11 @@ import numpy as np
 
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.frame import Step
 from deixis_tracker.hands import Hand, cut_hand, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
 from deixis_tracker.kalman import PointFilter
-from deixis_tracker.messages import is_shown
-from deixis_tracker.persons import MOST_HANDS, HandTrack, Person
-from deixis_tracker.seconds import Step
+from deixis_tracker.persons import MOST_HANDS, HandTrack, Person, is_shown
 from deixis_tracker.segmentation import Blob
 
 HAND_ACCELERATION = 60.0  # head widths per second squared

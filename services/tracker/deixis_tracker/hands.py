@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from deixis_tracker.views import Mask
+from deixis_tracker.frame import Mask
 
 CELLS_PER_WIDTH = 12  # resolution of the geodesic distances
 NEAR_SHOULDER = 1.2  # head widths: a blob that starts so near the shoulder starts with the upper arm

@@ -13,14 +13,12 @@ import numpy as np
 
 from deixis_tracker.background import Background
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.faces import look, measure
-from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder
+from deixis_tracker.faces import FaceSearch, look, measure
+from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around, repeated, to_frame
+from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder, Walkers, silhouette_heads
 from deixis_tracker.kalman import PointFilter
-from deixis_tracker.newcomers import FaceSearch, Walkers, silhouette_heads
 from deixis_tracker.persons import Person
-from deixis_tracker.seconds import Step, repeated
 from deixis_tracker.skin import SkinModel
-from deixis_tracker.views import COARSE, Box, Image, Mask, Views, around, to_frame
 
 HEAD_ACCELERATION = 25.0  # head widths per second squared
 UNSEEN_SPEED_KEPT = 0.8**30  # of a head that is not seen, per second: it is not flown out of the picture
@@ -28,10 +26,11 @@ LEAST_COARSE_HEAD_PX = 32  # narrower heads are followed at full resolution
 HEAD_PER_BOX = 0.96  # width of the head, of that of the Haar box that `faces.look` finds on it
 BOX_BELOW_HEAD = 0.04  # the centre of that box lies so far below the head's, head widths
 LOOK_S, STAGGERED_S = 1 / 6, 1 / 30  # persons are looked at in different frames
-MEASURE_S = 0.8  # measuring a face takes longer than all else in a frame
-AWAY_S = 0.3
-# A face that is new, or was turned away or covered, is measured in each frame: pose estimation starts with it.
-FRESH_S, FRESH_SIGHTINGS = 0.5, 5
+# Measuring a face takes longer than all else in a frame, and who estimates head poses needs it when a head begins. A face that
+# was turned away or covered may still be turning: measured in each frame, it would agree with itself.
+MEASURE_S, MEASURE_BACK_S = 0.8, 0.1
+AWAY_S, BACK_FOR_S = 0.3, 0.5
+NEW_FOR_S, NEW_SIGHTINGS = 0.5, 5  # a new face is measured in each frame
 LEARN_COLOURS_S = 1 / 15
 SKIN_FROM_EVERY = 3  # sightings of the face
 MOST_IN_FRONT = 2.5  # a face on the body of a tracked person is a shirt, unless it is so much larger: somebody in front
@@ -92,7 +91,7 @@ class HeadTracks:
             return
         if not covered:
             if step.now_ns - person.face_ns > AWAY_S * 1e9:
-                person.fresh_ns, person.measured = step.now_ns, 0
+                person.back_ns = step.now_ns
             person.face_ns = step.now_ns
         person.sightings += 1
         person.seen_ns = step.now_ns
@@ -137,10 +136,7 @@ class HeadTracks:
         """Measure the frontal faces that are due in this frame: one, that its time stays bounded, the least known first."""
         for person in self.persons:
             person.frontal = None
-        for person in sorted(self.persons, key=lambda p: p.measured):
-            fresh = person.measured < FRESH_SIGHTINGS and step.now_ns - person.fresh_ns < FRESH_S * 1e9
-            if not fresh and not step.periods(MEASURE_S, person.person_id * STAGGERED_S):
-                continue
+        for person in sorted((p for p in self.persons if _measuring_is_due(p, step)), key=lambda p: p.measured):
             seen = _look(person, views)
             if seen is not None:
                 person.measured += 1
@@ -155,23 +151,23 @@ class HeadTracks:
         self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, HEAD_PER_BOX * c.width)]
         for face in self._search.confirmed(views, step):
             width = HEAD_PER_BOX * face.width
-            person = self._add(face.x, face.y, width, -BOX_BELOW_HEAD * width, views, room, step)
+            person = self._add(face.x, face.y - BOX_BELOW_HEAD * width, width, views, room, step)
             if person is not None:
                 _learn_skin(person, views.full, skin)
 
     def _find_walkers(self, views: Views, room: Background, people: Mask, step: Step) -> None:
         heads = [] if room.unstable else silhouette_heads(views.changed, views.skin, people)
         for head in self._walkers.believed(heads, step):
-            self._add(head.x, head.y, head.width, 0.0, views, room, step)
+            self._add(head.x, head.y, head.width, views, room, step)
 
-    def _add(self, x: float, y: float, width: float, up: float, views: Views, room: Background, step: Step) -> Person | None:
-        """A new person whose head was found at (x, y) and has its centre `up` pixels from there; None where it is not new."""
+    def _add(self, x: float, y: float, width: float, views: Views, room: Background, step: Step) -> Person | None:
+        """A new person whose head was found with its centre at (x, y); None where it is not new, or one too many."""
         if self._is_known(x, y, width):
             return None
         if len(self.persons) >= self._config.max_persons:
             self.left_out += 1
             return None
-        motion = PointFilter(x, y + up, 0.1 * width, HEAD_ACCELERATION * width)
+        motion = PointFilter(x, y, 0.1 * width, HEAD_ACCELERATION * width)
         now_ns = step.now_ns
         person = Person(next(self._person_ids), next(self._ids), motion, width, HeadColours(), now_ns, now_ns, now_ns)
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
@@ -188,6 +184,13 @@ class HeadTracks:
             if dx < 1.2 and -1.2 < dy < 6 and width < MOST_IN_FRONT * p.width:
                 return True
         return False
+
+
+def _measuring_is_due(person: Person, step: Step) -> bool:
+    if person.measured < NEW_SIGHTINGS and step.now_ns - person.since_ns < NEW_FOR_S * 1e9:
+        return True
+    was_away = step.now_ns - person.face_ns > AWAY_S * 1e9 or step.now_ns - person.back_ns < BACK_FOR_S * 1e9
+    return step.periods(MEASURE_BACK_S if was_away else MEASURE_S, person.person_id * STAGGERED_S) > 0
 
 
 def _look(person: Person, views: Views) -> Box | None:

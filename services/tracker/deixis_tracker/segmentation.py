@@ -9,9 +9,9 @@ import numpy as np
 
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.frame import COARSE, Image, Mask, Views, around
 from deixis_tracker.persons import Person
 from deixis_tracker.skin import SkinModel, hysteresis
-from deixis_tracker.views import COARSE, Image, Mask, Views, around
 
 MOST_BLOBS = 24
 FACE_RIM, SLIVER = 0.22, 0.6  # a region with that share so near a head is the rim of a turned face

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from deixis_tracker.frame import Image, Mask
 from deixis_tracker.skin_prior import OTHER, SKIN, Gaussian
-from deixis_tracker.views import Image, Mask
 
 Array = NDArray[np.float64]
 

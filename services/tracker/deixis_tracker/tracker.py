@@ -16,14 +16,12 @@ from deixis_schemas.runs import RunClock
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import load_cascade
+from deixis_tracker.frame import Image, Mask, Step, Views, coarsened
 from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.head_tracks import HeadTracks
-from deixis_tracker.messages import tracks_of
-from deixis_tracker.persons import people_mask
-from deixis_tracker.seconds import Step
+from deixis_tracker.persons import people_mask, tracks_of
 from deixis_tracker.segmentation import hand_blobs
 from deixis_tracker.skin import SkinModel
-from deixis_tracker.views import Image, Mask, Views, coarsened
 
 LEAST_SIDE_PX = 32
 LONGEST_STEP_NS = 500_000_000

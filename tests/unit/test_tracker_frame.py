@@ -1,5 +1,5 @@
 import pytest
-from deixis_tracker.seconds import Step, repeated
+from deixis_tracker.frame import Step, repeated
 
 
 def steps(rate_hz, seconds, rounded_to_ns=1):
