@@ -35,7 +35,7 @@ class FusionService:
         self._rows = config.answer.rows
         self._fusion = Fusion(config, node.producer)
         self._joiner = FrameJoiner(config.joining.lockstep_age_limit_s if node.lockstep else config.joining.age_limit_s)
-        self._monitor = SourceMonitor((*STAGES, "camera"), config.joining.dead_after_s)
+        self._monitor = SourceMonitor((*STAGES, topics.FRAME.stage), config.joining.dead_after_s)
         self._end = SourceEnd(config.joining.source_silent_s)
         self._edits = PoiEdits(registry, topics.POI.key(node.robot, id=""), self._announce)
         self._started_s = node.monotonic_s()
@@ -67,7 +67,7 @@ class FusionService:
         self._monitor.update(self._readings(), now_s)
         for frame in self._joiner.due(now_s, self._monitor.dead()):
             self._answer_frame(frame, now_s)
-        camera_waits = self._node.lockstep and "camera" in self._node.alive_stages()
+        camera_waits = self._node.lockstep and topics.FRAME.stage in self._node.alive_stages()
         if self._end.is_over(now_s, camera_waits):
             self._publish(self._fusion.end(self._now_ns()))
         self._report_sources(now_s)
@@ -129,7 +129,7 @@ class FusionService:
 
     def _readings(self) -> list[Reading]:
         alive = self._node.alive_stages()
-        pairs: list[tuple[str, Any]] = [*zip(STAGES, self._parts, strict=True), ("camera", self._camera)]
+        pairs: list[tuple[str, Any]] = [*zip(STAGES, self._parts, strict=True), (topics.FRAME.stage, self._camera)]
         return [
             Reading(
                 stage=stage,

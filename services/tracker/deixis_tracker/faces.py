@@ -5,7 +5,7 @@ frame does a few. Hits become candidates which are looked at again in the next f
 hits land on shirts and furniture, so a face is believed after several hits in separate frames, with skin in its middle.
 
 How wide and where the box of the cascade is on a face depends by up to 12 % on the size at which the cascade sees it. So a
-place is looked at quickly at one size, and measured at several, whose mean counts.
+place is looked at quickly at one size, and measured at several in turn, whose mean counts.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LOOK_S = 1 / 30  # at candidates
 LEAST_SKIN = 0.12
 SEARCH_S = 0.1  # once somebody is tracked; before, in each frame
 LOOKED_AT_PX = 32  # a place that is looked at is scaled to this width of a face
-FIRST_AT_PX, MEASURED_AT_PX = 50.0, (56.0, 62.0, 68.0)
+MEASURED_AT_PX = (56.0, 62.0, 68.0)
 MEASURED_BOX_M, MEASURED_BOX_DROP_M = 0.197, 0.006  # width of the box so measured, and how far below the head's centre it is
 
 
@@ -92,16 +92,18 @@ def look(grey: Image, x: float, y: float, width: float) -> Box | None:
     return Box(columns.start + best[0] / fx, rows.start + best[1] / fy, best[2] / fx, best[3] / fy)
 
 
-def measure(frame: Image, seen: Box) -> FrontalFace | None:
-    """What `look` has seen, measured; both in pixels of the (H, W, 3) frame. None where it does not show at other sizes."""
-    first = _find(frame, _Found(*seen.centre, seen.w), FIRST_AT_PX)
-    if not first:
+def measure(frame: Image, seen: Box, turn: int) -> FrontalFace | None:
+    """What `look` has seen, measured; both in pixels of the (H, W, 3) frame. None where it does not show at another size.
+
+    One of the sizes is used in each `turn`: whoever takes the mean of three turns has that of all three.
+    """
+    x, y = seen.centre
+    found = _find(frame, _Found(x, y, seen.w), MEASURED_AT_PX[turn % len(MEASURED_AT_PX)])
+    if not found:
         return None
-    face = min(first, key=lambda f: np.hypot(f.x - seen.centre[0], f.y - seen.centre[1]))
-    found = [again for at in MEASURED_AT_PX for again in _find(frame, face, at)]
-    box_x, box_y, box_width = (float(v) for v in np.mean(found or [face], axis=0))
-    head_y = box_y - MEASURED_BOX_DROP_M / MEASURED_BOX_M * box_width
-    return FrontalFace(centre_px=(box_x, head_y), width_px=FACE_WIDTH_M / MEASURED_BOX_M * box_width)
+    box = min(found, key=lambda f: np.hypot(f.x - x, f.y - y))
+    head_y = box.y - MEASURED_BOX_DROP_M / MEASURED_BOX_M * box.width
+    return FrontalFace(centre_px=(box.x, head_y), width_px=FACE_WIDTH_M / MEASURED_BOX_M * box.width)
 
 
 def _find(frame: Image, face: _Found, at_px: float) -> list[_Found]:

@@ -139,9 +139,9 @@ class HeadTracks:
         for person in sorted((p for p in self.persons if _measuring_is_due(p, step)), key=lambda p: p.measured):
             seen = _look(person, views)
             if seen is not None:
-                person.measured += 1
                 in_frame = Box(*to_frame(seen.x, seen.y, views.scale), seen.w * views.scale, seen.h * views.scale)
-                person.frontal = measure(views.frame, in_frame)
+                person.frontal = measure(views.frame, in_frame, person.measured)
+                person.measured += 1
                 return
 
     # --- new ones -----------------------------------------------------------------------------------------------------
