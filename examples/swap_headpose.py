@@ -14,6 +14,7 @@ from collections import defaultdict
 import numpy as np
 import zenoh
 from deixis_schemas import Producer, codec, topics
+from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_schemas.messages import HeadPoses
 
 FRAMES_TO_START = 10
@@ -22,8 +23,10 @@ MAX_SINE, SIGMA_DEG = 0.97, 15.0
 
 
 def dark_offset(picture, box):
-    """Where the dark lies in a face box, -1 its left edge to 1 its right; None where there is nothing to see."""
-    x, y, w, h = (max(0, round(v)) for v in box)
+    """Where the dark lies on the head with this face box, -1 its left edge to 1 its right; None: nothing to see."""
+    x, y, w, h = box
+    wider = (HEAD_WIDTH_M / FACE_WIDTH_M - 1) * w
+    x, y, w, h = (max(0, round(v)) for v in (x - wider / 2, y, w + wider, h))
     grey = picture[y : y + h, x : x + w].mean(axis=2)
     if min(grey.shape) < 8:
         return None
@@ -72,7 +75,7 @@ def main():
         poses = session.declare_publisher(topics.HEAD_POSES.key(given.robot), encoding=codec.encoding_of(HeadPoses))
         alive = session.liveliness().declare_token(topics.alive_key(given.robot, *producer))
         print(f"swap_headpose: alive as {producer.instance}", flush=True)
-        held, first = {}, defaultdict(list)
+        held, first, run = {}, defaultdict(list), None
         while alive:
             seen = read(topics.TRACKS, tracks.recv())
             while (sample := frames.try_recv()) is not None:
@@ -84,6 +87,8 @@ def main():
             held = dict(list(held.items())[-8:])
             if seen is None or seen.frame_id not in held:
                 continue
+            if seen.run != run:  # the camera began anew, or the recording plays again: other people, or the same elsewhere
+                run, first = seen.run, defaultdict(list)
             frame = held[seen.frame_id]
             picture = np.frombuffer(frame.data, np.uint8).reshape(frame.height, frame.width, 3)
             faces = {track.person_id: track for track in seen.tracks if track.kind == "face" and track.person_id is not None}

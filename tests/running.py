@@ -136,7 +136,7 @@ def free_port() -> int:
 
 def get_json(session: zenoh.Session, key: str, timeout_s: float = 2.0) -> list[dict[str, Any]]:
     """The JSON answers to a get, none when nobody answers in time. Fails on an error reply."""
-    separator = "&" if "?" in key else "?"
+    separator = ";" if "?" in key else "?"
     answers = []
     for reply in session.get(f"{key}{separator}format=json", timeout=timeout_s):
         assert reply.ok is not None, f"{key}: {reply.err.payload.to_string() if reply.err else 'no answer'}"

@@ -18,6 +18,7 @@ Row = tuple[float, float, float]
 Square = tuple[Row, Row, Row]
 
 UNDISTORT_STEPS = 20
+FOCAL_LIMITS_PX = (1.0, 1e6)
 
 
 class LensError(ValueError):
@@ -47,10 +48,12 @@ class Lens:
 
     @staticmethod
     def of(info: CameraInfo) -> Lens:
-        """The lens that the camera tells of. Raises LensError where it has no intrinsics yet."""
+        """The lens that the camera tells of. Raises LensError where it has no intrinsics yet, or none that can be."""
         if info.camera_matrix is None or not (info.width and info.height):
             raise LensError("camera_matrix: the camera has no intrinsics yet")
         fx, _, cx, _, fy, cy, *_ = info.camera_matrix
+        if not all(FOCAL_LIMITS_PX[0] <= focal <= FOCAL_LIMITS_PX[1] for focal in (fx, fy)):
+            raise LensError(f"camera_matrix: focal lengths of {fx:.3g} and {fy:.3g} pixels")
         model = info.distortion_model if any(info.distortion) else "none"
         return Lens(info.width, info.height, (fx, fy, cx, cy), model, tuple(info.distortion))
 

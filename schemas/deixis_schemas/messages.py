@@ -315,7 +315,7 @@ class FocalSet(Part):
 class Evidence(Part):
     """What one source contributed."""
 
-    source: Name = Field(description="`gesture` or `headpose`.")
+    source: Name = Field(description="`gesture` or `headpose`; `robot` where its pose is in doubt.")
     producer: Text = Field(default="", description="`stage/instance` that made it; empty if there was none.")
     status: SourceStatus
     observed: Text = Field(description="What was observed, e.g. 'point_left' or 'yaw -61.9 +- 3.1 deg'; why nothing was.")

@@ -107,7 +107,7 @@ def test_garbage_on_keys_that_only_tools_hear_and_in_gets_disturbs_nobody(runnin
         for payload, label in garbage(topic).values():
             running.session.put(topic.key(ROBOT, stage="tracker"), payload, encoding=label)
     for path in ("fusion/state", "camera/info", "tracker/health", "fusion/poi/P1"):
-        for parameters in ("?format=xml", "?op=nonsense", "?format=json&op=put"):
+        for parameters in ("?format=xml", "?op=nonsense", "?format=json;op=put"):
             for _ in running.session.get(running.key(path) + parameters, payload=os.urandom(500), timeout=2.0):
                 pass
     assert running.state()["pois"]

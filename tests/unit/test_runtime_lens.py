@@ -68,6 +68,7 @@ def test_an_assumed_field_of_view_spans_the_picture():
     assert lens.ray((-0.5, 239.5), SIZE)[0] == pytest.approx(-np.tan(np.radians(30)))
 
 
-def test_a_camera_without_intrinsics_is_no_lens():
+@pytest.mark.parametrize("matrix", [None, (0.0,) * 9, (-560.0, *MATRIX[1:]), (1e9, *MATRIX[1:])])
+def test_a_camera_without_intrinsics_that_can_be_is_no_lens(matrix):
     with pytest.raises(LensError, match="camera_matrix"):
-        Lens.of(camera_info().model_copy(update={"camera_matrix": None}))
+        Lens.of(camera_info().model_copy(update={"camera_matrix": matrix}))

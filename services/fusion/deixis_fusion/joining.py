@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
+from deixis_schemas import topics
 from deixis_schemas.messages import FrameId, Gestures, HeadPoses, OfFrame, Tracks
 
 Part = Tracks | HeadPoses | Gestures
 
-TRACKER, HEADPOSE, GESTURE = "tracker", "headpose", "gesture"
+TRACKER, HEADPOSE, GESTURE = topics.TRACKS.stage, topics.HEAD_POSES.stage, topics.GESTURES.stage
 STAGES = (TRACKER, HEADPOSE, GESTURE)
 MAX_PENDING = 256
 

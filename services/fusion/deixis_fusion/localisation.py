@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from deixis_runtime.lens import Lens, LensError
+from deixis_runtime.lens import Lens
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Track, Tracks
 
@@ -18,7 +18,6 @@ Vector = tuple[float, float, float]
 
 # What a message can say of a position, to either side of the map's origin.
 FARTHEST_M = 1e5
-FOCAL_LIMIT_PX = 1e6
 
 
 @dataclass(frozen=True)
@@ -40,10 +39,7 @@ class Camera:
     @staticmethod
     def of(info: CameraInfo) -> Camera:
         """The camera that this message tells of. Raises LensError where it has no intrinsics, or none that can be."""
-        lens = Lens.of(info)
-        if not all(1 <= focal <= FOCAL_LIMIT_PX for focal in lens.matrix[:2]):
-            raise LensError(f"camera_matrix: focal lengths of {lens.matrix[0]:.3g} and {lens.matrix[1]:.3g} pixels")
-        return Camera(lens, info.mount)
+        return Camera(Lens.of(info), info.mount)
 
 
 @dataclass(frozen=True)

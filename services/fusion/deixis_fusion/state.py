@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from deixis_runtime.queries import Refused
-from deixis_schemas import codec, topics
 from deixis_schemas.messages import MAX_PERSONS, MAX_POIS, MAX_TEXT, NAME_PATTERN, FrameId, Producer, SourceState, State
 
 from .fusion import Fusion
@@ -50,10 +49,10 @@ class Standing:
 
 
 def state_of(asked: Asked, standing: Standing, fusion: Fusion, registry: Registry, edits: PoiEdits) -> State:
-    """The state as asked for. Raises Refused where that is more than the topic allows."""
+    """The state as asked for. More than the topic allows is refused by the runtime, which says what to ask instead."""
     pois = registry.pois()
     chosen = [poi for poi in pois if asked.rows.poi_id in (None, poi.poi_id)][: asked.rows.top]
-    state = State(
+    return State(
         stamp_ns=standing.now_ns,
         stage=standing.producer.stage,
         instance=standing.producer.instance,
@@ -73,12 +72,6 @@ def state_of(asked: Asked, standing: Standing, fusion: Fusion, registry: Registr
         edits_lost=standing.edits_lost,
         rejected_edits=list(edits.rejections),
     )
-    size = len(codec.encode_json(state))
-    if size > topics.STATE.max_bytes:
-        raise Refused(
-            f"top: {asked.rows.top} rows make {size} bytes, more than {topics.STATE.max_bytes}; ask by person= or poi="
-        )
-    return state
 
 
 def _number(parameters: Mapping[str, str], name: str, least: int, most: int) -> int | None:
