@@ -84,6 +84,10 @@ class Watcher:
     def state(self) -> str:
         return self.infos[-1].state if self.infos else ""
 
+    def said_end(self) -> bool:
+        """The camera said that it ended. Outside lockstep its last frame may have been dropped on a busy machine."""
+        return self.state() == "ended"
+
     def at_end(self) -> bool:
         """The camera said that it ended, and its last frame is here: the word, more urgent, may overtake it."""
         return self.state() == "ended" and bool(self.frames) and self.frames[-1].frame_id == self.said_last()
@@ -176,11 +180,14 @@ def write_film(path: Path, frames: int = 20, rate_hz: float = 25.0) -> Path:
 def test_a_film_is_published_whole_at_its_own_rate_and_its_end_is_said(endpoint: str, tmp_path: Path) -> None:
     film = write_film(tmp_path / "film.mp4")
     with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (camera, watcher):
-        wait_for(watcher.at_end, "the end")
+        wait_for(watcher.said_end, "the end")
         seqs, stamps = (np.array([getattr(frame, name) for frame in watcher.frames]) for name in ("seq", "stamp_ns"))
-        counters = watcher.get(topics.HEALTH.key(watcher.robot, stage="camera"))[0]["counters"]
-        assert len(seqs) + counters.get("pictures_skipped", 0) == 20, "a busy machine may skip some, and counts them"
-        assert (seqs[0], seqs[-1], np.diff(seqs).min() > 0) == (0, 19, True)
+        health = watcher.get(topics.HEALTH.key(watcher.robot, stage="camera"))[0]
+        published = next(item["published"] for item in health["outputs"] if item["key"].endswith(topics.FRAME.path))
+        skipped = health["counters"].get("pictures_skipped", 0)
+        assert published + skipped == 20, "a busy machine may skip some, and counts them"
+        assert len(seqs) > 10, "and Zenoh may drop some on the way"
+        assert (seqs[0], np.diff(seqs).min() > 0) == (0, True)
         assert (np.diff(stamps) / np.diff(seqs)).min() > 38e6
         assert np.median(np.diff(stamps) / np.diff(seqs)) == pytest.approx(40e6, abs=2e6)
         assert abs(time.time_ns() - stamps[-1]) < 10e9
@@ -241,7 +248,7 @@ def test_a_live_run_is_named_for_the_time_of_the_start(endpoint: str, tmp_path: 
     for _ in range(2):
         began_ms = time.time_ns() // 1_000_000
         with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (_, watcher):
-            wait_for(watcher.at_end, "the end")
+            wait_for(lambda: watcher.said_end() and watcher.frames, "the end")
             assert began_ms < watcher.frames[0].run < time.time_ns() // 1_000_000
             assert {frame.run for frame in watcher.frames} == {watcher.frames[0].run}
             runs.append(watcher.frames[0].run)
@@ -295,10 +302,10 @@ def test_a_film_that_is_cut_off_plays_to_the_cut_and_health_says_so(endpoint: st
     film = write_film(tmp_path / "film.avi", frames=30)
     film.write_bytes(film.read_bytes()[: film.stat().st_size // 2])
     with camera_and_watcher(endpoint, tmp_path, "--set", f"source={film}") as (_, watcher):
-        wait_for(watcher.at_end, "the end")
+        wait_for(watcher.said_end, "the end")
         wait_for(lambda: bool(watcher.healths), "a heartbeat")
         assert len(watcher.frames) >= 5
-        assert f"{watcher.frames[-1].seq + 1} of about 30 frames could be read" in watcher.infos[-1].reason
+        assert f"{watcher.infos[-1].last_seq + 1} of about 30 frames could be read" in watcher.infos[-1].reason
         wait_for(lambda: watcher.healths[-1].state == "degraded", "the state")
 
 
@@ -326,7 +333,7 @@ def test_the_site_file_gives_calibration_and_mount(endpoint: str, tmp_path: Path
         "  mount: {position_m: [0.1, 0, 1.4], pitch_up_deg: 5, roll_deg: 1}\n"
     )
     with camera_and_watcher(endpoint, tmp_path, "--site", str(site)) as (_, watcher):
-        wait_for(watcher.at_end, "the end")
+        wait_for(watcher.said_end, "the end")
         info = watcher.infos[-1]
         assert info.camera_matrix == pytest.approx((150, 0, 79.5, 0, 150, 59.5, 0, 0, 1))
         assert (info.distortion_model, info.distortion) == ("plumb_bob", [0.1, 0, 0, 0, 0])
