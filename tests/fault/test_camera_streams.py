@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -142,10 +143,18 @@ def test_an_ip_camera_is_live_and_its_pictures_carry_the_time_of_their_arrival()
 def test_the_conversion_of_a_picture_is_not_in_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = SimpleNamespace(now_ns=0)
 
-    class SlowCapture(cv2.VideoCapture):
-        def retrieve(self, *arguments: object) -> object:
+    class SlowCapture:
+        """Holds a capture: OpenCV's own type, when it is subclassed, tears the heap (segfaults in later tests)."""
+
+        def __init__(self, *arguments: Any) -> None:
+            self._capture = cv2.VideoCapture(*arguments)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._capture, name)
+
+        def retrieve(self, *arguments: Any) -> Any:
             clock.now_ns += 50_000_000
-            return super().retrieve(*arguments)
+            return self._capture.retrieve(*arguments)
 
     monkeypatch.setattr(videos, "cv2", SimpleNamespace(**vars(cv2) | {"VideoCapture": SlowCapture}))
     with serving(mjpeg_handler(8)) as port:
