@@ -55,7 +55,7 @@ def findings(system: System, listening: Listening) -> list[Finding]:
 
 def missing_stages(system: System) -> Iterator[Finding]:
     """Stages of the contract that nobody runs. An output that is heard all the same comes from a stand-in."""
-    heard = {producer.split("/")[0] for p in system.processes if p.health for i in p.health.inputs for producer in i.producers}
+    heard = {producer.split("/")[0] for producer in heard_producers(system)}
     for stage in system.missing():
         if stage in heard:
             yield Finding("note", f"{stage}: not one of the runtime's stages, but its messages are heard")
@@ -63,17 +63,26 @@ def missing_stages(system: System) -> Iterator[Finding]:
             yield Finding("wrong", f"{stage}: no process of it is alive", f"start it: deixis up --only {stage} ...")
 
 
+def heard_producers(system: System) -> set[str]:
+    """`stage/instance` of all whose messages the stages have heard lately."""
+    return {producer for p in system.processes if p.health for i in p.health.inputs for producer in i.producers}
+
+
 def hung_stages(system: System) -> Iterator[Finding]:
-    """Processes with a token that answer nothing, or answer without a token."""
+    """Processes with a token that answer nothing, or answer without a token. A guest that is heard need not give health."""
+    heard = heard_producers(system)
     for process in system.processes:
-        if process.standing == "hung":
+        name = f"{process.stage}/{process.instance}"
+        if process.standing == "hung" and name in heard:
+            yield Finding("note", f"{name}: its messages are heard, but it answers no get of its health")
+        elif process.standing == "hung":
             yield Finding(
                 "wrong",
-                f"{process.stage}/{process.instance}: alive but gives no answer",
+                f"{name}: alive but gives no answer",
                 "it hangs or is stopped (SIGSTOP): restart it; or access control denies gets on its health key",
             )
         elif process.standing == "no token":
-            yield Finding("note", f"{process.stage}/{process.instance}: answers but holds no liveliness token")
+            yield Finding("note", f"{name}: answers but holds no liveliness token")
 
 
 def ill_stages(system: System) -> Iterator[Finding]:

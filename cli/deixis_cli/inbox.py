@@ -80,7 +80,7 @@ class Inbox:
         if item.sample.kind == zenoh.SampleKind.DELETE:
             return Received(key, topic, None, item.received_ns)
         try:
-            message = read_message(topic, item.sample.payload.to_bytes(), str(item.sample.encoding))
+            message = read_message(topic, key, item.sample.payload.to_bytes(), str(item.sample.encoding))
         except codec.CodecError as error:
             self._reject(key, str(error))
             return None
@@ -92,12 +92,13 @@ class Inbox:
             self.rejections[key] = why
 
 
-def read_message(topic: Topic, payload: bytes, encoding: str) -> Message:
+def read_message(topic: Topic, key: str, payload: bytes, encoding: str) -> Message:
     """The message of a payload on this topic, a frame without its image bytes. Raises codec.CodecError.
 
-    POIs may be JSON, as generic clients put them.
+    POIs may be JSON, as generic clients put them, and then take their id from the key.
     """
     if topic is topics.POI and not encoding.startswith(codec.MSGPACK):
-        return codec.decode_json(topic.type, payload)
+        content = codec.parse_json(payload, max_bytes=topic.max_bytes)
+        return codec.validate(topic.type, {"poi_id": key.rsplit("/", 1)[-1]} | content)
     message = codec.decode(topic.type, payload, encoding, max_bytes=topic.max_bytes)
     return message.model_copy(update={"data": b""}) if isinstance(message, Frame) else message

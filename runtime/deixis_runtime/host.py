@@ -72,7 +72,10 @@ def chosen_stages(only: tuple[str, ...], without: tuple[str, ...]) -> tuple[str,
     for name in only:
         if name not in installed:
             raise HostFailed(f"stage '{name}' is not installed here (deixis-{name})")
-    return tuple(name for name in known if name in (only or installed) and name not in without)
+    chosen = tuple(name for name in known if name in (only or installed) and name not in without)
+    if not chosen:
+        raise HostFailed("no stage is left to start" if installed else "no stage is installed here (deixis-camera, ...)")
+    return chosen
 
 
 class Host:

@@ -53,6 +53,7 @@ class Node:
         self._parent = os.getppid() if options.supervised else None
         self._event = threading.Event()
         self._limit = RateLimit()
+        self._logged_state: HealthState = "ok"
         self._heartbeat = Heartbeat(self.producer)
         self._inputs: list[Subscription] = []
         self._outputs: list[Publisher] = []
@@ -176,10 +177,9 @@ class Node:
             counters[name] = counters.get(name, 0) + n
 
     def set_state(self, state: HealthState, reason: str = "") -> None:
-        """Say in health whether the stage does its work."""
-        if (state, reason) != (self._heartbeat.state, self._heartbeat.reason):
-            self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
+        """Say in health whether the stage does its work, and log it where that changes."""
         self._heartbeat.state, self._heartbeat.reason = state, reason
+        self._log_state()
 
     def note(self, key: str, text: str | None) -> None:
         """Show a condition in health, or take it back with None."""
@@ -190,8 +190,18 @@ class Node:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
+    def _log_state(self) -> None:
+        # By state, not by reason: a reason that counts seconds would be a line each step. A state that comes and goes is
+        # limited, too; the heartbeat then says later where it has come to rest.
+        state, reason = self._heartbeat.state, self._heartbeat.reason
+        if state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
+            return
+        self._logged_state = state
+        self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
+
     def _beat(self) -> None:
         self._heartbeat.beat()
+        self._log_state()
         self._look_at_queues()
         self._health.put(self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))
         if self._parent is not None and os.getppid() != self._parent:

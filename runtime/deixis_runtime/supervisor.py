@@ -117,7 +117,8 @@ class Supervisor:
         if status == EXIT_CONFIG:
             process.given_up = "its settings are wrong"
         elif len(process.restarts) == RESTART_LIMIT and now - process.restarts[0] < RESTART_WINDOW_S:
-            process.given_up = f"it ended {RESTART_LIMIT} times within {RESTART_WINDOW_S:.0f} s"
+            ends, last = RESTART_LIMIT + 1, say_status(status)
+            process.given_up = f"it ended {ends} times within {RESTART_WINDOW_S:.0f} s, the last time by {last}"
         if process.given_up:
             log.error("%s is given up: %s", process.name, process.given_up)
             return

@@ -59,7 +59,8 @@ def unpack(payload: bytes, *, max_bytes: int = 1 << 20) -> dict[str, Any]:
     try:
         content = msgpack.unpackb(payload, raw=False)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
-        raise Malformed(f"not msgpack: {error or type(error).__name__}") from None
+        # Some of msgpack's errors have no text.
+        raise Malformed(f"not msgpack: {str(error) or type(error).__name__}") from None
     if not isinstance(content, dict):
         raise Malformed(f"not a map but {type(content).__name__}")
     return content

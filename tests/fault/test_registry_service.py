@@ -205,8 +205,11 @@ def test_edits_are_answered_or_refused_with_the_fields_name_and_seen_in_state(be
     bench.session.put(f"deixis/{bench.robot}/fusion/poi/door", b'{"position_m": [4, 5, 6]}')
     bench.session.put(f"deixis/{bench.robot}/fusion/poi/bad", b'{"position_m": 4}')
     bench.session.put(f"deixis/{bench.robot}/fusion/poi/x/fusion/poi/vase", b'{"position_m": [9, 9, 9]}')
-    assert bench.ask("fusion/poi/vase/x", {"position_m": [9, 9, 9]}) is None
-    wait_until(lambda: bench.state().edits_rejected >= 3, "three refused edits")
+    no_poi = ("refused", f"key: 'deixis/{bench.robot}/fusion/poi/vase/x' names no single POI")
+    assert bench.ask("fusion/poi/vase/x", {"position_m": [9, 9, 9]}) == no_poi
+    bench.session.delete(f"deixis/{bench.robot}/fusion/poi/vase/x")
+    bench.session.put(f"deixis/{bench.robot}/fusion/poi", b'{"position_m": [9, 9, 9]}')
+    wait_until(lambda: bench.state().edits_rejected == 7, "seven refused edits")
     state = bench.state()
     assert [(poi.poi_id, poi.position_m) for poi in state.pois] == [("door", (4, 5, 6)), ("vase", (1, 2, 3))]
     assert any(edit.key.endswith("/bad") and edit.reason.startswith("position_m") for edit in state.rejected_edits)

@@ -146,6 +146,15 @@ def test_get_answers_json_when_asked_and_refuses_other_formats(peer, robot, loop
     assert b"format: 'xml'" in reply.err.payload.to_bytes()
 
 
+def test_a_state_whose_reason_counts_seconds_is_logged_when_it_comes_and_when_it_goes(node, caplog):
+    caplog.set_level("INFO")
+    for tenth in range(30):
+        node.set_state("degraded", f"headpose is dead: gone, silent for {tenth / 10} s")
+    node.set_state("ok")
+    said = [text for text in caplog.messages if text.startswith(("degraded", "ok"))]
+    assert said == ["degraded: headpose is dead: gone, silent for 0.0 s", "ok"]
+
+
 def test_two_producers_on_one_key_are_noticed_and_said(node, waiting, caplog, put):
     frames = node.subscribe(topics.FRAME)
     for number, instance in enumerate(("one", "two", "one"), 1):

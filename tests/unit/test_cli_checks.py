@@ -89,6 +89,12 @@ def test_a_stand_in_that_is_heard_takes_the_place_of_a_missing_stage():
     assert wrong(system(processes={"headpose": [], "fusion": [process("fusion", inputs=heard)]})) == []
 
 
+def test_a_guest_that_is_heard_but_gives_no_health_does_not_hang():
+    heard = [InputHealth(key="deixis/r1/headpose/poses", producers=["headpose/mine"], age_s=0.1)]
+    guest = StageProcess("headpose", "mine", True, None)
+    assert wrong(system(processes={"headpose": [guest], "fusion": [process("fusion", inputs=heard)]})) == []
+
+
 def test_denied_subscriptions_and_denied_edits_are_told_from_silence():
     said = wrong(system(), Listening(frozenset(topics.STAGES) - {"camera"}, edits_reach_fusion=False))
     assert said == [

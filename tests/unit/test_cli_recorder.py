@@ -37,12 +37,12 @@ def test_a_recorded_message_is_the_message():
 
 def test_a_frame_is_read_without_its_image_bytes():
     frame = next(message for message in SAMPLES if type(message).__name__ == "Frame")
-    read = read_message(topics.FRAME, codec.encode(frame), codec.encoding_of(type(frame)))
+    read = read_message(topics.FRAME, topics.FRAME.key("r1"), codec.encode(frame), codec.encoding_of(type(frame)))
     assert read == frame.model_copy(update={"data": b""})
 
 
 def test_a_poi_is_read_as_generic_clients_put_it():
-    poi = read_message(topics.POI, b'{"poi_id": "door", "position_m": [1, 2, 3]}', "application/json")
+    poi = read_message(topics.POI, topics.POI.key("r1", id="door"), b'{"position_m": [1, 2, 3]}', "application/json")
     assert (poi.poi_id, poi.position_m) == ("door", (1, 2, 3))
 
 

@@ -167,6 +167,16 @@ def test_a_wrong_version_is_said_and_taken_back(monitor: SourceMonitor) -> None:
     assert monitor.status("headpose")[0] == "ok"
 
 
+def test_a_forgotten_old_stage_does_not_switch_off_the_one_that_replaced_it(monitor: SourceMonitor) -> None:
+    beside = {"age_s": 0.03, "last_error": "HeadPoses version '1'", "last_error_kind": "wrong_version"}
+    for rejected in range(1, 4):
+        monitor.update([reading(rejected=rejected, **beside)], float(rejected))
+        assert monitor.status("headpose") == ("ok", "")
+        assert "headpose" not in monitor.dead()
+    assert monitor.refused() == ["some messages on the key of headpose are refused: HeadPoses version '1'"]
+    assert "version '1'" in next(state.reason for state in monitor.states() if state.stage == "headpose")
+
+
 def test_garbage_makes_a_stage_late_with_the_reason(monitor: SourceMonitor) -> None:
     monitor.update([reading(rejected=1, age_s=5.0, last_error="poses.0.yaw_deg: too large", last_error_kind="malformed")], 1.0)
     assert monitor.status("headpose", missed=True) == ("late", "its messages are refused: poses.0.yaw_deg: too large")

@@ -45,10 +45,11 @@ class FusionService:
         self._parts = [node.subscribe(topic, depth=DEPTH) for topic in (topics.TRACKS, topics.HEAD_POSES, topics.GESTURES)]
         self._camera = node.subscribe(topics.CAMERA_INFO, depth=4)
         self._robot = node.subscribe(topics.ROBOT_POSE, depth=DEPTH)
-        self._poi_edits = node.subscribe_edits(topics.POI.key(node.robot, id="*"))
+        self._poi_edits = node.subscribe_edits(topics.POI.key(node.robot, id="**"))
         self._belief = node.publish(topics.BELIEF)
         self._target = node.publish(topics.TARGET)
-        node.serve_get(topics.POI, self._answer_poi, id="*")
+        # Keys that name no single POI, too: an edit there is refused in words, not met with silence.
+        node.serve_get(topics.POI, self._answer_poi, id="**")
         node.serve_get(topics.STATE, self._answer_state)
         self._place_robot()
         self._fusion.set_pois(registry.pois())
@@ -208,6 +209,7 @@ class FusionService:
         for text in (doubled := self._monitor.doubled()):
             self._node.warn("producers", text)
         self._node.note("producers", "; ".join(doubled) or None)
+        self._node.note("refused", "; ".join(self._monitor.refused()) or None)
         self._node.note("robot", self._robot_note())
         standing = {stage: self._monitor.status(stage) for stage in STAGES}
         faults = [f"{stage} is {status}: {why}" for stage, (status, why) in standing.items() if status != "ok"]

@@ -49,10 +49,12 @@ class SourceMonitor:
     def status(self, stage: str, *, missed: bool = False) -> tuple[SourceStatus, str]:
         """Status of a stage and why it is not ok. `missed`: it did not answer the frame in question."""
         reading = self._readings[stage]
-        if self._refused_lately(reading):
+        silent = reading.age_s is None or reading.age_s > self._dead_after_s
+        # While others on the key are understood, what is refused must not stand in their way: an old stage that somebody
+        # forgot would switch off the one that replaced it.
+        if silent and self._refused_lately(reading):
             kind: SourceStatus = "wrong_version" if reading.last_error_kind == "wrong_version" else "late"
             return kind, f"its messages are refused: {reading.last_error}"
-        silent = reading.age_s is None or reading.age_s > self._dead_after_s
         if silent and not reading.alive:
             return "dead", "no such process is alive" if reading.age_s is None else f"gone, silent for {reading.age_s:.1f} s"
         if missed:
@@ -69,6 +71,14 @@ class SourceMonitor:
         """All stages for State."""
         return [self._state(reading) for reading in self._readings.values()]
 
+    def refused(self) -> list[str]:
+        """One sentence for each key on which messages were refused lately beside others that were accepted."""
+        return [
+            f"some messages on the key of {reading.stage} are refused: {reading.last_error}"
+            for reading in self._readings.values()
+            if self._refused_lately(reading) and self.status(reading.stage)[0] == "ok"
+        ]
+
     def doubled(self) -> list[str]:
         """One sentence for each key on which several processes publish."""
         return [
@@ -79,7 +89,7 @@ class SourceMonitor:
 
     def _state(self, reading: Reading) -> SourceState:
         status, reason = self.status(reading.stage)
-        double = next((text for text in self.doubled() if f" of {reading.stage}:" in text), "")
+        beside = [text for text in (*self.refused(), *self.doubled()) if f" of {reading.stage}" in text]
         return SourceState(
             stage=reading.stage,
             status=status,
@@ -87,13 +97,13 @@ class SourceMonitor:
             age_s=reading.age_s,
             received=reading.received,
             rejected=reading.rejected,
-            reason="; ".join(part for part in (reason, double) if part)[:MAX_TEXT],
+            reason="; ".join(part for part in (reason, *beside) if part)[:MAX_TEXT],
         )
 
     def _refused_lately(self, reading: Reading) -> bool:
-        """Whether what it sent last was refused, and that not long ago; an accepted message clears `last_error_kind`."""
+        """Whether a message on its key was refused not long ago."""
         at_s = self._rejected_s.get(reading.stage)
-        return at_s is not None and bool(reading.last_error_kind) and self._now_s - at_s <= self._dead_after_s
+        return at_s is not None and self._now_s - at_s <= self._dead_after_s
 
 
 class SourceEnd:
