@@ -33,8 +33,9 @@ class Moment:
     """A person at a time; world frame, metres.
 
     phase: of a pointing; nonpoint_phase: of a quiet gesture. poi, arm_side: while there is a phase; gestures of both arms have
-    none. head_rotation (3, 3): world from a head that faces +Z; gaze_deg: yaw, pitch up of the eyes in the head. head_centre, eyes
-    (3,). shoulder ... fingertip: (3,) per side. place (3,): on the floor; azimuth_deg: where the body faces, from +Z toward +X.
+    none. head_rotation (3, 3): world from a head that faces +Z; gaze_deg: yaw, pitch up of the eyes in the head. head_centre,
+    eyes (3,). shoulder ... fingertip: (3,) per side. place (3,): on the floor; azimuth_deg: where the body faces, from +Z
+    toward +X.
     """
 
     time_s: float

@@ -1,7 +1,7 @@
 """Arms: two-bone inverse kinematics, and arms from the directions of their bones.
 
-Directions are in the frame of the person (Y up, +Z ahead, +X its left). `trunk` (3, 3) is the turn of the chest there. An arm is
-kept relative to the chest, so that it goes along when the trunk turns.
+Directions are in the frame of the person (Y up, +Z ahead, +X its left). `trunk` (3, 3) is the turn of the chest there. An arm
+is kept relative to the chest, so that it goes along when the trunk turns.
 """
 
 from __future__ import annotations

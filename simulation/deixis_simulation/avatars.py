@@ -47,10 +47,10 @@ class AvatarError(ValueError):
 class Avatar:
     """One person as packed: T-pose, Y up, faces +Z, metres, feet at Y = 0.
 
-    vertices, normals (n, 3); texture_coordinates (n, 2), origin at the pictures' top left; triangles (m, 3); part (n,) as in the
-    label images, eyes are head; is_eye, is_body (n,): eyeballs with their lashes; the body's mesh without eyes and wigs.
-    colours, normal_map: RGB. skin_mask: 255 where the texel is skin. weights (n, bones) sum to 1 per vertex. bones, parent, joints:
-    names, index of the parent (-1: none), positions (bones, 3). morphs: name -> (indices (k,), offsets (k, 3)).
+    vertices, normals (n, 3); texture_coordinates (n, 2), origin at the pictures' top left; triangles (m, 3); part (n,) as in
+    the label images, eyes are head; is_eye, is_body (n,): eyeballs with their lashes; the body's mesh without eyes and wigs.
+    colours, normal_map: RGB. skin_mask: 255 where the texel is skin. weights (n, bones) sum to 1 per vertex. bones, parent,
+    joints: names, index of the parent (-1: none), positions (bones, 3). morphs: name -> (indices (k,), offsets (k, 3)).
     """
 
     name: str
@@ -176,7 +176,9 @@ def _picture(path: Traversable) -> Picture:
 def _weights(bone: NDArray[np.uint8], weight: NDArray[np.uint16], bones: int) -> sparse.csr_array:
     share = weight / np.maximum(weight.sum(axis=1, keepdims=True, dtype=np.int64), 1)
     rows = np.repeat(np.arange(len(bone)), bone.shape[1])
-    matrix = sparse.csr_array((share.ravel().astype(np.float32), (rows, bone.ravel().astype(np.int32))), shape=(len(bone), bones))
+    matrix = sparse.csr_array(
+        (share.ravel().astype(np.float32), (rows, bone.ravel().astype(np.int32))), shape=(len(bone), bones)
+    )
     matrix.eliminate_zeros()
     return matrix
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def _chain() -> dict[str, str]:
     after = {}
     for prefix in BONE_PREFIX.values():
         limbs = ("Arm", "ForeArm", "Hand", "HandMiddle1"), ("UpLeg", "Leg", "Foot", "ToeBase")
-        after.update({prefix + a: prefix + b for limb in limbs for a, b in zip(limb, limb[1:], strict=False)})
+        after.update({prefix + a: prefix + b for limb in limbs for a, b in pairwise(limb)})
         fingers = [f"{prefix}Hand{finger}" for finger in (*FINGERS, "Thumb")]
         after.update({f"{finger}{n}": f"{finger}{n + 1}" for finger in fingers for n in (1, 2, 3)})
     return after

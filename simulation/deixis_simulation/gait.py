@@ -78,7 +78,9 @@ class WalkPlan:
             return self._turning(self.start, self.azimuths_deg[0], self.azimuths_deg[1], since / first)
         if since <= first + way:
             return self._going(since - first, way)
-        return self._turning(self.end, self.azimuths_deg[1], self.azimuths_deg[2], min((since - first - way) / max(last, 1e-9), 1.0))
+        return self._turning(
+            self.end, self.azimuths_deg[1], self.azimuths_deg[2], min((since - first - way) / max(last, 1e-9), 1.0)
+        )
 
     def _going(self, since_s: float, way_s: float) -> Stance:
         ramp = max(self._ramp_s, 1e-9)
@@ -91,7 +93,9 @@ class WalkPlan:
             done = self.speed_m_s * (since_s - ramp / 2)
         effort = smooth_step(min(since_s, back_s) / (0.7 * ramp))
         place = self.start + (self.end - self.start) * (done / max(self.distance_m, 1e-9))
-        return Stance(place, self.azimuths_deg[1], 2 * math.pi * done / self.stride_m, self.stride_m, effort, effort, moves=True)
+        return Stance(
+            place, self.azimuths_deg[1], 2 * math.pi * done / self.stride_m, self.stride_m, effort, effort, moves=True
+        )
 
     def _turning(self, place: Floats, before: float, after: float, share: float) -> Stance:
         turned = (after - before) * smooth_step(share)
@@ -139,8 +143,6 @@ def walk(posture: Posture, body: Body, stance: Stance) -> None:
         posture.arms[side] = mix_arms(posture.arms[side], swinging, stance.swing)
 
 
-
-
 def _swing_deg(body: Body, stride_m: float) -> float:
     return math.degrees(math.asin(min(stride_m / (4 * leg_length(body)), 0.6)))
 
@@ -156,7 +158,9 @@ def _foot_reach(body: Body, leg: Leg) -> float:
     """How far below the hip the lowest point of heel and ball is."""
     shank_deg = leg.swing_deg - leg.knee_deg
     foot = math.radians(shank_deg + leg.ankle_deg)
-    ankle = body.length("RightUpLeg") * math.cos(math.radians(leg.swing_deg)) + body.length("RightLeg") * math.cos(math.radians(shank_deg))
+    ankle = body.length("RightUpLeg") * math.cos(math.radians(leg.swing_deg)) + body.length("RightLeg") * math.cos(
+        math.radians(shank_deg)
+    )
     height = float(body.joint("RightFoot")[1])
     ball = float(body.joint("RightToeBase")[2] - body.joint("RightFoot")[2])
     heel = -0.05 * body.scale

@@ -54,14 +54,13 @@ class Doing:
 
     def arm(self, side: ArmSide, upper: Direction, fore: Direction, hand: Direction, shape: HandShape, palm: Direction) -> Arm:
         """An arm from the directions of its bones."""
-        chest = self.chest
-        bones = [_mirrored(side, way) for way in (upper, fore, hand)]
-        return arm_from_directions(self.body, side, chest, *bones, shape, palm=_mirrored(side, palm))
+        along, before, at_end, looks = (_mirrored(side, way) for way in (upper, fore, hand, palm))
+        return arm_from_directions(self.body, side, self.chest, along, before, at_end, shape, palm=looks)
 
     def at_head(
         self, place: Direction, hand: Direction, shape: HandShape, palm: Direction, elbow: Direction, follows: bool = True
     ) -> Arms:
-        """The action's arm with its wrist at a place of the head: metres of an adult from its middle; directions of the head."""
+        """The action's arm with its wrist at a place of the head: metres of an adult from its middle."""
         side, head = self.action.arm, self.skeleton.rotation("Head") if follows else np.eye(3)
         middle = self.skeleton.carried("Head", self.body.head_centre)
         wrist = middle + head @ (_mirrored(side, place) * self.body.head_scale)
@@ -81,9 +80,7 @@ class Doing:
         return arm_to_wrist(self.body, side, self.chest, shoulder, wrist, toward, hand, shape, palm=palm)
 
 
-def gesture_arms(
-    action: Quiet, body: Body, posture: Posture, since_s: float, time_s: float, noise: SmoothNoise
-) -> Arms:
+def gesture_arms(action: Quiet, body: Body, posture: Posture, since_s: float, time_s: float, noise: SmoothNoise) -> Arms:
     """Arms of a quiet gesture as it would stand `since_s` after the begin of its stroke, on a body in that posture."""
     doing = Doing(action, body, posture.spine_turn(), solve(body, posture), since_s, time_s, noise)
     return _GESTURES[action.gesture](doing)
@@ -113,12 +110,12 @@ def _thumb(do: Doing) -> Arms:
 
 def _scratch(do: Doing) -> Arms:
     w = do.wave
-    shape = mix_shapes(CLAW, REST, 0.4 + 0.3 * w)
-    return do.at_head((0.155, -0.02 + 0.012 * w, -0.035), (-0.35, 1.0, -0.25 + 0.08 * w), shape, INWARD, (1.0, -0.25, 0.1))
+    place, hand = (0.18, -0.09 + 0.012 * w, -0.03), (-0.62, 1.0, -0.30 + 0.08 * w)
+    return do.at_head(place, hand, mix_shapes(CLAW, REST, 0.4 + 0.3 * w), (-1.0, -0.4, 0.0), (1.0, -0.35, 0.2))
 
 
 def _phone(do: Doing) -> Arms:
-    return do.at_head((0.115, -0.12, 0.02), (-0.15, 1.0, -0.15), CLAW, INWARD, (0.6, -1.0, 0.2))
+    return do.at_head((0.115, -0.15, 0.03), (-0.12, 1.0, -0.25), CLAW, INWARD, (0.6, -1.0, 0.2))
 
 
 def _beats(do: Doing) -> Arms:
@@ -135,16 +132,14 @@ def _beats(do: Doing) -> Arms:
 
 
 def _drink(do: Doing) -> Arms:
-    sip = 0.5 - 0.5 * math.cos(2 * math.pi * 0.5 * do.since_s) if do.since_s > 0 else 0.0
-    place = (0.075, -0.155 + 0.02 * sip, 0.20)
-    return do.at_head(place, (-0.75, 0.62 + 0.2 * sip, -0.12), GRIP, (-0.35, 0.0, -1.0), (0.5, -1.0, 0.1))
+    sip = math.sin(math.pi * 0.5 * do.since_s) ** 2
+    place, hand = (0.12, -0.215 + 0.025 * sip, 0.17), (-0.80, 0.50 + 0.15 * sip, 0.05)
+    return do.at_head(place, hand, GRIP, (-0.35, 0.0, -1.0), (0.5, -1.0, 0.1))
 
 
 def _hips(do: Doing) -> Arms:
-    return {
-        side: do.at_body(side, "Hips", (0.215, 0.10, 0.0), (-0.55, -0.30, 0.75), FLAT, (-0.8, 0.0, -0.6), (1.0, 0.0, -0.45))
-        for side in SIDES
-    }
+    place, hand, palm, elbow = (0.215, 0.10, 0.0), (-0.55, -0.30, 0.75), (-0.8, 0.0, -0.6), (1.0, 0.0, -0.45)
+    return {side: do.at_body(side, "Hips", place, hand, FLAT, palm, elbow) for side in SIDES}
 
 
 def _crossed(do: Doing) -> Arms:
@@ -159,14 +154,16 @@ def _crossed(do: Doing) -> Arms:
 
 
 def _chin(do: Doing) -> Arms:
-    return do.at_head((0.045, -0.235, 0.125), (-0.22, 1.0, -0.10), mix_shapes(CLAW, FIST, 0.5), (-0.3, 0.0, -1.0), (0.35, -1.0, 0.1))
+    shape = mix_shapes(CLAW, FIST, 0.5)
+    return do.at_head((0.045, -0.235, 0.125), (-0.22, 1.0, -0.10), shape, (-0.3, 0.0, -1.0), (0.35, -1.0, 0.1))
 
 
 def _hair(do: Doing) -> Arms:
     """The hand goes over the hair, from the forehead back."""
     back = 0.5 - 0.5 * math.cos(math.pi * do.progress * _PASSES)
-    place = (0.165, 0.02 + 0.03 * back, 0.10 - 0.12 * back)
-    return do.at_head(place, (-0.62, 0.80, -0.15 - 0.2 * back), mix_shapes(CLAW, FLAT, 0.6), (-0.8, -0.5, -0.1), (1.0, -0.2, 0.2))
+    place = (0.19 - 0.01 * back, 0.005, 0.09 - 0.12 * back)
+    hand = (-0.9, 0.46, -0.1 - 0.2 * back)
+    return do.at_head(place, hand, mix_shapes(CLAW, FLAT, 0.6), (-0.5, -0.9, -0.1), (1.0, -0.2, 0.2))
 
 
 def _glasses(do: Doing) -> Arms:
@@ -176,20 +173,19 @@ def _glasses(do: Doing) -> Arms:
 
 def _carry(do: Doing) -> Arms:
     bob = 0.02 * do.wave
-    return {
-        side: do.arm(side, (0.14, -1.0, 0.06), (-0.12, 0.02 + bob, 1.0), (-0.22, 0.10 + bob, 1.0), GRIP, (-0.9, 0.45, 0.0))
-        for side in SIDES
-    }
+    fore, hand = (-0.12, 0.02 + bob, 1.0), (-0.22, 0.10 + bob, 1.0)
+    return {side: do.arm(side, (0.14, -1.0, 0.06), fore, hand, GRIP, (-0.9, 0.45, 0.0)) for side in SIDES}
 
 
 def _facepass(do: Doing) -> Arms:
     """The open hand passes before the face, without touching it."""
     way = math.cos(math.pi * do.progress * _PASSES)
-    place = (0.07 + 0.22 * way, -0.12, 0.24)
+    place = (0.08 + 0.18 * way, -0.12, 0.24)
     return do.at_head(place, (-0.75, 0.65, 0.0), mix_shapes(OPEN, FLAT, 0.6), (0.0, 0.0, -1.0), (0.7, -1.0, 0.1), follows=False)
 
 
 _GESTURES: dict[QuietGesture, Callable[[Doing], Arms]] = {
     "wave": _wave, "stop": _stop, "thumb": _thumb, "scratch": _scratch, "phone": _phone, "beats": _beats, "drink": _drink,
-    "hips": _hips, "crossed": _crossed, "chin": _chin, "hair": _hair, "glasses": _glasses, "carry": _carry, "facepass": _facepass,
+    "hips": _hips, "crossed": _crossed, "chin": _chin, "hair": _hair, "glasses": _glasses, "carry": _carry,
+    "facepass": _facepass,
 }  # fmt: skip

@@ -18,7 +18,7 @@ _SPREAD = (1.0, 0.2, -0.6, -1.3)
 
 @dataclass(frozen=True)
 class HandShape:
-    """Degrees. bend (4, 3): index, middle, ring, little finger; base, middle and last joint. thumb: opposition, middle, last."""
+    """Degrees. bend (4, 3): index, middle, ring, little finger; base, middle, last joint. thumb: opposition, middle, last."""
 
     bend: Floats
     thumb: Floats
@@ -70,7 +70,7 @@ def finger_rotations(body: Body, side: ArmSide, hand: Floats, shape: HandShape) 
 
 
 def _thumb(body: Body, prefix: str, hand: Floats, shape: HandShape, along: Floats, palm: Floats) -> dict[str, Floats]:
-    """Opposition brings the thumb toward the palm, half of it beneath the middle finger; its ends bend toward the ring finger."""
+    """Opposition brings the thumb to the palm, half beneath the middle finger; its ends bend toward the ring finger."""
     opposition, middle, last = shape.thumb
     first = body.direction(f"{prefix}HandThumb1")
     under = body.joint(f"{prefix}HandMiddle1") + palm * 0.03 * body.scale - along * 0.01

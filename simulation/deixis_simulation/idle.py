@@ -52,7 +52,9 @@ class Idle:
         size *= self._person.restlessness
         slow, fast = self._slow.at(time_s)[12 + row : 16 + row], self._fast.at(time_s)[row : row + 3]
         shake = (slow[:3] * 0.8 + fast * 0.1) * size
-        return replace(arm, upper=turn(shake[1], shake[0], shake[2]) @ arm.upper, fore=arm.fore @ turn(0, 0, 0.8 * size * slow[3]))
+        return replace(
+            arm, upper=turn(shake[1], shake[0], shake[2]) @ arm.upper, fore=arm.fore @ turn(0, 0, 0.8 * size * slow[3])
+        )
 
     def _lids(self, time_s: float) -> float:
         """How far the lids are closed: one blink in each span of the mean duration, somewhere in it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,9 @@ from .trunk import Look, azimuth_of, enough_trunk_deg, usual_trunk_deg
 _HEAD_PITCH_SHARE = 0.55
 _HEAD_RELEASE_S = 0.12
 """The head leaves the target that much later than its lag says."""
-_ACROSS_DEG, _OUT_DEG = 80.0, 125.0
-"""How far an arm reaches from straight ahead of the chest, across it and outward."""
+_ACROSS_DEG = {"straight": 75.0, "bent": 55.0, "hip": 45.0}
+_OUT_DEG = {"straight": 125.0, "bent": 100.0, "hip": 85.0}
+"""How far an arm points from straight ahead of the chest, across it and outward."""
 _SHAPES = {"index": INDEX, "flat": FLAT}
 _ROUNDS = 4
 
@@ -69,7 +71,7 @@ def plan_pointing(
 
 
 def pointing_arm(action: Pointing, body: Body, posture: Posture, target: Floats, reach: float) -> Arm:
-    """The arm that points at `target` (3,) in that posture. `reach`: share of the arm's length that is used if it is straight."""
+    """The arm that points at `target` (3,) in that posture. `reach`: share of the arm's length that a straight one uses."""
     if action.style == "straight":
         return _straight_arm(action, body, posture, target, reach)
     return _bent_arm(action, body, posture, target)
@@ -118,12 +120,13 @@ def _bent_arm(action: Pointing, body: Body, posture: Posture, target: Floats) ->
 
 
 def _upper_arm(action: Pointing, chest: Floats, level: Floats, sign: float) -> Floats:
-    """Direction of the upper arm when the forearm goes along `level`; it goes out where the forearm has to go outward."""
-    out = max(0.0, sign * float((chest.T @ level)[0]))
+    """Of the upper arm, when the forearm goes along `level`: out where that goes outward, ahead where it crosses the belly."""
+    sideward = sign * float((chest.T @ level)[0])
+    out, across = max(sideward, 0.0), max(-sideward, 0.0)
     side, ahead = chest @ np.array([sign, 0.0, 0.0]), chest @ np.array([0.0, 0.0, 1.0])
     if action.style == "hip":
-        return unit(-UP + (0.16 + 0.15 * out) * side - 0.12 * ahead + 0.12 * level)
-    return unit(-UP + (0.30 + 0.25 * out) * side + 0.15 * ahead + 0.45 * level)
+        return unit(-UP + (0.16 + 0.15 * out) * side + (0.6 * across - 0.12) * ahead + 0.12 * level)
+    return unit(-UP + (0.30 + 0.25 * out) * side + (0.15 + 0.45 * across) * ahead + 0.45 * level)
 
 
 def _on_ray(start: Floats, target: Floats, centre: Floats, radius: float) -> Floats:
@@ -131,7 +134,8 @@ def _on_ray(start: Floats, target: Floats, centre: Floats, radius: float) -> Flo
     along, offset = unit(target - start), start - centre
     half = float(offset @ along)
     root = max(half * half - float(offset @ offset) + radius * radius, 0.0)
-    return start + along * (root**0.5 - half)
+    leaves: Floats = start + along * (math.sqrt(root) - half)
+    return leaves
 
 
 def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, roll: float) -> Look:
@@ -147,5 +151,6 @@ def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, 
 def _trunk_deg(action: Pointing, azimuth: float, head: float) -> float:
     """As people usually do, times the gain; but as much as arm and neck need."""
     wanted = usual_trunk_deg(azimuth) * action.torso_gain
-    left, right = (_OUT_DEG, _ACROSS_DEG) if action.arm == "left" else (_ACROSS_DEG, _OUT_DEG)
+    across, out = _ACROSS_DEG[action.style], _OUT_DEG[action.style]
+    left, right = (out, across) if action.arm == "left" else (across, out)
     return enough_trunk_deg(min(max(wanted, azimuth - left), azimuth + right), head)

@@ -40,7 +40,9 @@ class QuietPlan:
     def _speak(self, posture: Posture, time_s: float, share: float) -> None:
         """Who gestures while talking moves mouth and head."""
         n = self.noise.at(2.4 * time_s)
-        posture.morphs.update(MouthOpen=0.22 * abs(n[8]) * share, AE_AA=0.35 * max(n[9], 0.0) * share, UH_OO=0.4 * max(n[10], 0.0) * share)
+        posture.morphs.update(
+            MouthOpen=0.22 * abs(n[8]) * share, AE_AA=0.35 * max(n[9], 0.0) * share, UH_OO=0.4 * max(n[10], 0.0) * share
+        )
         yaw, pitch, roll = posture.head
         posture.head = (yaw + 2 * n[11] * share, pitch + 2.5 * n[12] * share, roll + 2 * n[13] * share)
 

@@ -32,8 +32,8 @@ class Leg:
 class Posture:
     """Angles in degrees in the frame of the person (+Z ahead, yaw positive toward its left). Spine: relative to the hips.
 
-    head: yaw, pitch up, roll; not relative to the trunk. gaze: yaw and pitch up of the eyes in the head. offset (3,): of the hips,
-    metres; the feet stay unless `legs` says how they go. morphs: share of each morph of the face.
+    head: yaw, pitch up, roll; not relative to the trunk. gaze: yaw and pitch up of the eyes in the head. offset (3,): of the
+    hips, metres; the feet stay unless `legs` says how they go. morphs: share of each morph of the face.
     """
 
     arms: dict[ArmSide, Arm]

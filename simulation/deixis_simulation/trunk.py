@@ -35,7 +35,7 @@ class Look:
     gaze: tuple[float, float]
 
     def mix_into(self, posture: Posture, share: float, eyes_ahead: float = 0.0) -> None:
-        """Bring a posture's head there by a share; half of its own small movements stay. `eyes_ahead`: share that eyes lead by."""
+        """Bring a posture's head there by a share; half of its small movements stay. `eyes_ahead`: the eyes' lead, a share."""
         rest = 1 - 0.5 * share
         yaw, pitch, roll = posture.head
         start = yaw
