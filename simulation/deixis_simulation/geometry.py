@@ -25,7 +25,8 @@ WORLD_OF_MAP: Floats = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 
 
 def to_world(position_m: Sequence[float]) -> Floats:
     """A map position, 2 (on the floor) or 3 numbers, in the world."""
-    return WORLD_OF_MAP @ np.array([*position_m, 0.0][:3], float)
+    world: Floats = WORLD_OF_MAP @ np.array([*position_m, 0.0][:3], float)
+    return world
 
 
 def to_map(world: Floats) -> Floats:
