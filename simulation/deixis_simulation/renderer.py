@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
+from .skinning import Mesh
 from .surface import Surface
 
 FloatPicture = NDArray[np.float32]
@@ -33,24 +35,6 @@ SHADE_SCALE = 4
 
 class RenderError(RuntimeError):
     """The renderer cannot work here; the text says what to install."""
-
-
-class Look(Protocol):
-    """How a person looks: constants of its mesh, and its pictures."""
-
-    triangles: NDArray[Any]
-    texture_coordinates: NDArray[Any]
-    part: NDArray[Any]
-    colours: NDArray[np.uint8]
-    normal_map: NDArray[np.uint8]
-    skin_mask: NDArray[np.uint8]
-
-
-class Posed(Protocol):
-    """A person's mesh at one time, world: vertices and unit normals (n, 3) float32."""
-
-    vertices: NDArray[np.float32]
-    normals: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -147,7 +131,7 @@ class Renderer:
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
             self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
 
-    def add_person(self, look: Look, tints: Tints) -> None:
+    def add_person(self, look: Avatar, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
         maps = self._texture(look.colours), self._texture(look.normal_map), self._texture(look.skin_mask)
         uniforms = {
@@ -159,7 +143,7 @@ class Renderer:
         mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
         self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1, True))
 
-    def pose(self, meshes: Sequence[Posed]) -> None:
+    def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
         for drawn, mesh in zip(self._people, meshes, strict=True):
             drawn.positions.write(np.ascontiguousarray(mesh.vertices, np.float32).tobytes())

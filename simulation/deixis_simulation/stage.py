@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import lighting
-from .renderer import FloatPicture, Look, Posed, Renderer, Tints, over, shadows_on
+from .renderer import FloatPicture, Renderer, Tints, over, shadows_on
 from .room import build_room
 from .scene import Scene
+from .skinning import Mesh
 
 SHADOW_CENTRE_M = 1.05
 """Height of the middle of what casts shadows."""
@@ -30,7 +32,7 @@ def subframes_for(motion_px: float) -> int:
 class Stage:
     """Renders one scene frame by frame. The room is rendered once for each place of the camera."""
 
-    def __init__(self, scene: Scene, looks: Sequence[Look]) -> None:
+    def __init__(self, scene: Scene, looks: Sequence[Avatar]) -> None:
         """`looks` are those of the scene's people, in order. Raises RenderError."""
         self._scene = scene
         self._renderer = Renderer(scene.camera.width, scene.camera.height)
@@ -47,7 +49,7 @@ class Stage:
         """Give the renderer's memory back."""
         self._renderer.close()
 
-    def picture(self, view: View, subframes: Sequence[Sequence[Posed]]) -> FloatPicture:
+    def picture(self, view: View, subframes: Sequence[Sequence[Mesh]]) -> FloatPicture:
         """Linear light (h, w, 3) RGB: the mean of the people's poses in `subframes` before the room."""
         middle = subframes[len(subframes) // 2]
         centre = self._centre(middle)
@@ -64,13 +66,13 @@ class Stage:
         room = shadows_on(self._room, self._plain, self._renderer.shade(view))
         return over(people / np.float32(len(subframes)), room)
 
-    def labels(self, view: View, meshes: Sequence[Posed]) -> NDArray[np.uint8]:
+    def labels(self, view: View, meshes: Sequence[Mesh]) -> NDArray[np.uint8]:
         """Label picture (h, w), see Renderer.labels."""
         if meshes:
             self._renderer.pose(meshes)
         return self._renderer.labels(view)
 
-    def _centre(self, meshes: Sequence[Posed]) -> Floats:
+    def _centre(self, meshes: Sequence[Mesh]) -> Floats:
         if not meshes:
             return np.array((0.0, SHADOW_CENTRE_M, -2.0))
         middles = [0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)) for mesh in meshes]
@@ -96,7 +98,7 @@ class Stage:
         x, y = places.mean(axis=0)
         return np.array((-y, 0.0, -x))
 
-    def _cast_shadows(self, meshes: Sequence[Posed], centre: Floats) -> None:
+    def _cast_shadows(self, meshes: Sequence[Mesh], centre: Floats) -> None:
         now = [mesh.vertices[::97] for mesh in meshes]
         if self._shadowed and all(
             float(np.abs(a - b).max()) < SHADOWS_STAND_M for a, b in zip(now, self._shadowed, strict=True)
