@@ -157,13 +157,13 @@ def _leg(body: Body, stance: Stance, phase: float) -> Leg:
 def _foot_reach(body: Body, leg: Leg) -> float:
     """How far below the hip the lowest point of heel and ball is."""
     shank_deg = leg.swing_deg - leg.knee_deg
-    foot = math.radians(shank_deg + leg.ankle_deg)
+    foot = math.radians(leg.foot_up_deg)
     ankle = body.length("RightUpLeg") * math.cos(math.radians(leg.swing_deg)) + body.length("RightLeg") * math.cos(
         math.radians(shank_deg)
     )
     height = float(body.joint("RightFoot")[1])
     ball = float(body.joint("RightToeBase")[2] - body.joint("RightFoot")[2])
-    heel = -0.05 * body.scale
+    heel = -0.08 * body.scale
     # A foot that is turned up by `foot` has its ball higher and its heel lower.
     return ankle + max(height * math.cos(foot) - along * math.sin(foot) for along in (ball, heel))
 
@@ -175,7 +175,7 @@ def _swinging_arm(body: Body, side: ArmSide, phase: float, swing: float) -> Arm:
     fore = (sign * 0.03, -math.cos(bent), math.sin(bent))
     hand = (fore[0], fore[1] - 0.1, fore[2])
     upper = (sign * 0.15, -math.cos(angle), math.sin(angle) - 0.04)
-    return arm_from_directions(body, side, np.eye(3), upper, fore, hand, REST, pronation_deg=20)
+    return arm_from_directions(body, side, np.eye(3), upper, fore, hand, REST, palm=(-sign, 0.0, -0.3))
 
 
 def _turn_s(turn_deg: float) -> float:

@@ -59,14 +59,17 @@ def plan_pointing(
     """Work out a pointing. `posture`: of the person before it; `target`, `camera`: in the person's frame, metres."""
     posture = copy.copy(posture)
     posture.arms = dict(posture.arms)
-    eyes = body.eyes + posture.offset
-    way = target - eyes
-    azimuth = azimuth_of(way, outward(action.arm))
-    look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - eyes), float(dice.uniform(-2, 2)))
-    trunk = _trunk_deg(action, azimuth, look.head[0])
-    posture.turn_trunk(trunk)
-    posture.head = look.head
-    reach = float(dice.uniform(0.95, 1.0))
+    roll, reach = float(dice.uniform(-2, 2)), float(dice.uniform(0.95, 1.0))
+    trunk = 0.0
+    for _ in range(2):
+        # Trunk and head move the place that the angles are measured from; so once more from there.
+        middle = solve(body, posture).carried("Head", body.head_centre)
+        way = target - middle
+        azimuth = azimuth_of(way, outward(action.arm))
+        look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - middle), roll)
+        before, trunk = trunk, _trunk_deg(action, azimuth, look.head[0])
+        posture.turn_trunk(trunk - before)
+        posture.head = look.head
     return PointingPlan(action, trunk, pointing_arm(action, body, posture, target, reach), look)
 
 
