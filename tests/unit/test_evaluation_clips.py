@@ -13,6 +13,7 @@ from deixis_fusion.localisation import to_base
 from deixis_runtime.site import load_site
 from hypothesis import given
 from hypothesis import strategies as st
+from labelled_views import turned_view
 
 PITCH = 0.1
 LEVEL = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]
@@ -158,17 +159,6 @@ def test_the_site_of_a_clip_is_one_that_the_stages_accept(tmp_path: Path) -> Non
     assert calibration.camera_matrix == (500, 0, 319.5, 0, 500, 239.5, 0, 0, 1)
     assert site.settings["fusion"]["registry"].startswith(str(tmp_path))
     assert yaml.safe_load((tmp_path / "camera.yaml").read_text())["image_width"] == 640
-
-
-def turned_view(yaw_deg: float, pitch_up_deg: float, roll_deg: float, centre: tuple[float, float, float]) -> dict[str, Any]:
-    """R and t of a camera turned to its left, up, and clockwise as seen from behind; at zero it looks along the world's -z."""
-    yaw, pitch, roll = np.radians([yaw_deg, pitch_up_deg, roll_deg])
-    ahead = np.array([-np.sin(yaw) * np.cos(pitch), np.sin(pitch), -np.cos(yaw) * np.cos(pitch)])
-    level = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
-    below = np.cross(ahead, level)
-    right = np.cos(roll) * level + np.sin(roll) * below
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
-    return {"R_world_to_cam": rotation.ravel().tolist(), "t_world_to_cam": (-rotation @ np.array(centre)).tolist()}
 
 
 @given(st.floats(-170, 170), st.floats(-60, 60), st.floats(-45, 45))
