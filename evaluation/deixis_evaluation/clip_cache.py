@@ -90,7 +90,8 @@ def make_missing(cache: ClipCache, seeds: Sequence[int], jobs: int, on_made: Cal
 
 def _make(cache: ClipCache, seed: int) -> None:
     command = [str(Path(sys.executable).parent / "deixis"), "simulate", "--out", str(cache.folder), "--count", "1"]
-    command += ["--seed", str(seed), *(["--kinds", ",".join(cache.kinds)] if cache.kinds else [])]
+    # With label pictures: `--truth tracker` and the comparison with real hands read them, and they cost little.
+    command += ["--labels", "--seed", str(seed), *(["--kinds", ",".join(cache.kinds)] if cache.kinds else [])]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=MADE_WITHIN_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -15,6 +15,7 @@ LABEL = (
 )
 SIMULATOR = f"""#!{sys.executable}
 import sys, pathlib
+sys.argv.remove("--labels")
 given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
 seed = int(given["--seed"])
 if seed == 1003:
