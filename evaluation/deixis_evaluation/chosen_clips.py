@@ -8,10 +8,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from .camera_pose import path_of
-from .clip_cache import ClipCache, default_root, make_missing, simulator_version
+from .clip_cache import ClipCache, default_root, find_simulator
 from .clips import Clip, ClipError, load_clips
 from .seeds import parse_seeds, say_set
 
@@ -20,7 +19,7 @@ from .seeds import parse_seeds, say_set
 class Choice:
     """What was asked for: a folder or seeds, and of these the clips whose names fit `pattern`.
 
-    kinds, cache, jobs: of the simulator's clips. cache: none for the usual place.
+    kinds, cache, jobs: of the simulator's clips; none for the usual place, and a job a processor.
     """
 
     folder: Path | None
@@ -28,7 +27,7 @@ class Choice:
     pattern: str = "*"
     kinds: tuple[str, ...] = ()
     cache: Path | None = None
-    jobs: int = 1
+    jobs: int | None = None
 
 
 @dataclass(frozen=True)
@@ -58,23 +57,12 @@ def choose(choice: Choice, console: Console) -> Chosen:
 
 def _of_seeds(choice: Choice, text: str, console: Console) -> Chosen:
     seeds = parse_seeds(text)
-    cache = ClipCache(choice.cache or default_root(), simulator_version(), choice.kinds)
+    cache = ClipCache(choice.cache or default_root(), find_simulator(), choice.kinds)
     console.print(f"{say_set(seeds)}; clips in {cache.folder}", markup=False, highlight=False, soft_wrap=True)
-    _make(cache, seeds.numbers, choice.jobs, console)
-    clips = [clip for clip in cache.load(seeds.numbers) if fnmatchcase(clip.name, choice.pattern)]
+    clips = [clip for clip in cache.clips(seeds.numbers, choice.jobs) if fnmatchcase(clip.name, choice.pattern)]
     if not clips:
         raise ClipError(f"no clip of seeds {seeds} is named {choice.pattern}")
     return Chosen(clips, cache.folder, str(seeds))
-
-
-def _make(cache: ClipCache, seeds: Sequence[int], jobs: int, console: Console) -> None:
-    missing = sum(cache.find(seed) is None for seed in seeds)
-    if not missing:
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("clips"), TimeRemainingColumn())
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task("rendering", total=missing)
-        make_missing(cache, seeds, jobs, lambda _: progress.advance(task))
 
 
 def _check_path(clip: Clip) -> None:

@@ -1,55 +1,79 @@
 """Clips of the simulator by seed: made where they are missing, and kept for the next time.
 
-The simulator is optional, so it is not imported: its command is run, one process a seed.
+The simulator is optional and no dependency, so it is imported only here, and only when its clips are asked for.
 """
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from .clips import Clip, ClipError, load_truth
 
 SIMULATOR = "deixis-simulation"
-MADE_WITHIN_S = 1800.0
-"""Longest time that one clip may take to be rendered."""
-SAID = 600
+PACKAGE = "deixis_simulation"
+SAID = 3
+"""So many failed clips are told of."""
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """What we use of deixis-simulation: its kinds of clips, and how scenes are drawn and rendered."""
+
+    version: str
+    kinds: Sequence[str]
+    draw: Any
+    jobs: Any
+    progress: Any
+
+    def scenes(self, seeds: Sequence[int], kinds: Sequence[str]) -> list[Any]:
+        """Scene 0 of each seed, of one of these kinds, of any where there are none. Raises ClipError for unknown kinds."""
+        unknown = sorted(set(kinds) - set(self.kinds))
+        if unknown:
+            raise ClipError(f"--kinds: '{unknown[0]}' is none of {', '.join(self.kinds)}")
+        return [self.draw.draw_scene(seed, 0, tuple(kinds) or tuple(self.kinds)) for seed in seeds]
+
+    def render(self, scenes: Sequence[Any], folder: Path, jobs: int | None) -> None:
+        """Render the scenes whose clips are not in the folder; label pictures too, for `--truth tracker` reads them.
+
+        Raises ClipError where one fails; those rendered before stay. Raises KeyboardInterrupt.
+        """
+        try:
+            with self.progress.shown_progress(scenes) as shown:
+                outcome = self.jobs.render_all(scenes, folder, jobs=jobs, labels=True, progress=shown)
+        except self.jobs.Interrupted:
+            raise KeyboardInterrupt from None
+        except OSError as error:
+            raise ClipError(f"clips cannot be kept in '{folder}': {error.strerror or error}") from None
+        if outcome.failed:
+            said = [f"{name}: {why}" for name, why in outcome.failed.items()]
+            raise ClipError(f"{len(said)} clips were not rendered: {'; '.join(said[:SAID])}")
 
 
 @dataclass(frozen=True)
 class ClipCache:
-    """A folder of clips made by one version of the simulator; of these `kinds` only, or of all where there are none.
-
-    A seed gives another clip when the kinds differ, so each choice of them has a folder of its own.
-    """
+    """Folders of clips, one for each version of the simulator and choice of kinds: by it a seed gives another clip."""
 
     root: Path
-    version: str
+    simulator: Simulator
     kinds: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
         """Where the clips lie."""
-        return self.root / self.version / ("-".join(self.kinds) or "all")
+        return self.root / self.simulator.version / ("-".join(self.kinds) or "all")
 
-    def find(self, seed: int) -> Path | None:
-        """The video of clip 0 of a seed, where it is there with its labels; both get their names when they are complete."""
-        found = [path for path in sorted(self.folder.glob(f"s{seed:04d}_000_*.mp4")) if path.with_suffix(".json").exists()]
-        return found[0] if found else None
-
-    def load(self, seeds: Sequence[int]) -> list[Clip]:
-        """The clips of these seeds. Raises ClipError where one is missing or bad."""
-        videos = {seed: self.find(seed) for seed in seeds}
-        missing = [str(seed) for seed, video in videos.items() if video is None]
-        if missing:
-            raise ClipError(f"'{self.folder}' holds no clip of seed {', '.join(missing[:5])}")
-        return [Clip(video.stem, video, load_truth(video.with_suffix(".json"))) for video in videos.values() if video]
+    def clips(self, seeds: Sequence[int], jobs: int | None) -> list[Clip]:
+        """Clip 0 of each seed. Raises ClipError where one cannot be made or read, KeyboardInterrupt when stopped."""
+        scenes = self.simulator.scenes(seeds, self.kinds)
+        self.simulator.render(scenes, self.folder, jobs)
+        videos = [self.folder / f"{scene.name}.mp4" for scene in scenes]
+        return [Clip(video.stem, video, load_truth(video.with_suffix(".json"))) for video in videos]
 
 
 def default_root() -> Path:
@@ -58,44 +82,18 @@ def default_root() -> Path:
     return (Path(cache) if cache else Path.home() / ".cache") / "deixis" / "clips"
 
 
-def simulator_version() -> str:
-    """Version of the simulator that is installed here. Raises ClipError where none is."""
+def find_simulator() -> Simulator:
+    """The simulator that is installed here. Raises ClipError where none is, or where it cannot be loaded."""
     try:
-        return version(SIMULATOR)
+        return Simulator(
+            version=version(SIMULATOR),
+            kinds=import_module(f"{PACKAGE}.scene").KINDS,
+            draw=import_module(f"{PACKAGE}.draw"),
+            jobs=import_module(f"{PACKAGE}.jobs"),
+            progress=import_module(f"{PACKAGE}.progress"),
+        )
     except PackageNotFoundError:
         hint = f"pip install {SIMULATOR} (in a checkout: pip install ./simulation)"
         raise ClipError(f"{SIMULATOR} is not installed: {hint}") from None
-
-
-def make_missing(cache: ClipCache, seeds: Sequence[int], jobs: int, on_made: Callable[[int], None] | None = None) -> None:
-    """Have the simulator make the clips that are not in the cache; `on_made` is called with each seed done.
-
-    Raises ClipError with the simulator's own words where one fails; those made before stay.
-    """
-    missing = [seed for seed in seeds if cache.find(seed) is None]
-    try:
-        cache.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ClipError(f"clips cannot be kept in '{cache.folder}': {error.strerror}") from None
-    workers = ThreadPoolExecutor(max(1, jobs))
-    try:
-        made = {workers.submit(_make, cache, seed): seed for seed in missing}
-        for future in as_completed(made):
-            future.result()
-            if on_made is not None:
-                on_made(made[future])
-    finally:
-        workers.shutdown(cancel_futures=True)
-
-
-def _make(cache: ClipCache, seed: int) -> None:
-    command = [str(Path(sys.executable).parent / "deixis"), "simulate", "--out", str(cache.folder), "--count", "1"]
-    # With label pictures: `--truth tracker` and the comparison with real hands read them, and they cost little.
-    command += ["--labels", "--seed", str(seed), *(["--kinds", ",".join(cache.kinds)] if cache.kinds else [])]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=MADE_WITHIN_S, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise ClipError(f"the clip of seed {seed} was not made: {error}") from None
-    if done.returncode or cache.find(seed) is None:
-        said = done.stderr.strip()[-SAID:] or f"exit status {done.returncode}, and no s{seed:04d}_000_*.mp4"
-        raise ClipError(f"the clip of seed {seed} was not made: {said}")
+    except ImportError as error:
+        raise ClipError(f"{SIMULATOR} cannot be loaded: {error}") from None

@@ -42,7 +42,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--seeds", metavar="A:B", help="instead of DIR: the simulator's clip of each seed from A to B - 1")
     parser.add_argument("--kinds", type=_names, default=(), metavar="KINDS", help="these kinds of clips only, e.g. point,quiet")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where these clips are kept (default: in the user's cache)")
-    parser.add_argument("--jobs", type=_jobs, default=1, metavar="J", help="how many are rendered at a time")
+    parser.add_argument("--jobs", type=_jobs, metavar="J", help="how many are rendered at a time (default: one a processor)")
     parser.add_argument(
         "--truth",
         type=_stages,

@@ -1,10 +1,12 @@
-import sys
+import io
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from deixis_evaluation import clip_cache
+from deixis_evaluation import chosen_clips, clip_cache
 from deixis_evaluation.chosen_clips import Choice, choose
-from deixis_evaluation.clip_cache import ClipCache, default_root, make_missing
+from deixis_evaluation.clip_cache import Simulator, default_root
 from deixis_evaluation.clips import ClipError
 from deixis_evaluation.seeds import SeedsError, parse_seeds, say_set
 from rich.console import Console
@@ -13,17 +15,6 @@ LABEL = (
     '{"meta": {"kind": "point", "fps": 30, "width": 640, "height": 480, "camera": {"K": [[500,0,319.5],[0,500,239.5],[0,0,1]],'
     '"R_world_to_cam": [1,0,0,0,-1,0,0,0,-1], "t_world_to_cam": [0,1.3,2]}, "pois": []}, "frames": [{"frame": 0}]}'
 )
-SIMULATOR = f"""#!{sys.executable}
-import sys, pathlib
-sys.argv.remove("--labels")
-given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
-seed = int(given["--seed"])
-if seed == 1003:
-    sys.exit("no lamp in this room")
-assert sys.argv[1] == "simulate" and given["--count"] == "1"
-for end, text in ((".mp4", ""), (".json", {LABEL!r})):
-    pathlib.Path(given["--out"], f"s{{seed:04d}}_000_{{given.get('--kinds', 'point')}}{{end}}").write_text(text)
-"""
 
 
 @pytest.mark.parametrize(
@@ -43,47 +34,74 @@ def test_seeds_that_are_none_too_many_or_of_two_sets_are_refused(text: str) -> N
         parse_seeds(text)
 
 
+class Rendering:
+    """A stand-in for the simulator's modules: seed 1003 fails."""
+
+    class Interrupted(Exception):
+        """Ctrl-C."""
+
+    def __init__(self) -> None:
+        self.rendered: list[str] = []
+        self.stopped = False
+
+    def draw_scene(self, seed: int, index: int, kinds: tuple[str, ...]) -> SimpleNamespace:
+        return SimpleNamespace(name=f"s{seed:04d}_{index:03d}_{kinds[-1]}")
+
+    def shown_progress(self, _: list[SimpleNamespace]) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def render_all(
+        self, scenes: list[SimpleNamespace], folder: Path, *, jobs: int, labels: bool, progress: None
+    ) -> SimpleNamespace:
+        assert (jobs, labels, progress) == (2, True, None)
+        if self.stopped:
+            raise self.Interrupted
+        folder.mkdir(parents=True, exist_ok=True)
+        for scene in scenes:
+            if not (folder / f"{scene.name}.json").exists():
+                self.rendered.append(scene.name)
+                (folder / f"{scene.name}.json").write_text(LABEL)
+        return SimpleNamespace(failed={scene.name: "no lamp" for scene in scenes if "1003" in scene.name})
+
+
 @pytest.fixture
-def simulator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A stand-in for `deixis simulate`, which fails on seed 1003."""
-    script = tmp_path / "bin" / "deixis"
-    script.parent.mkdir()
-    script.write_text(SIMULATOR)
-    script.chmod(0o755)
-    monkeypatch.setattr(clip_cache.sys, "executable", str(script.parent / "python"))
-    monkeypatch.setattr(clip_cache, "version", lambda _: "9.9")
-    return script
+def rendering(monkeypatch: pytest.MonkeyPatch) -> Rendering:
+    """A simulator that makes empty clips."""
+    made = Rendering()
+    monkeypatch.setattr(chosen_clips, "find_simulator", lambda: Simulator("9.9", ("point", "quiet"), made, made, made))
+    return made
 
 
-def test_clips_of_seeds_are_made_once_and_kept_by_version_and_kinds(simulator: Path, tmp_path: Path) -> None:
-    cache = ClipCache(tmp_path / "cache", "9.9", ("point", "quiet"))
-    made: list[int] = []
-    make_missing(cache, range(1000, 1003), 2, made.append)
-    assert sorted(made) == [1000, 1001, 1002]
-    assert [clip.name for clip in cache.load(range(1000, 1003))] == [f"s{seed}_000_point,quiet" for seed in (1000, 1001, 1002)]
-    simulator.unlink()
-    make_missing(cache, range(1000, 1003), 2, made.append)
-    assert len(made) == 3
-    assert cache.folder == tmp_path / "cache" / "9.9" / "point-quiet"
-
-
-@pytest.mark.usefixtures("simulator")
-def test_what_the_simulator_says_when_it_fails_is_passed_on(tmp_path: Path) -> None:
-    with pytest.raises(ClipError, match="seed 1003 was not made: no lamp"):
-        make_missing(ClipCache(tmp_path, "9.9"), [1003], 1)
-    with pytest.raises(ClipError, match="no clip of seed 7"):
-        ClipCache(tmp_path, "9.9").load([7])
-
-
-@pytest.mark.usefixtures("simulator")
-def test_a_choice_by_seeds_says_the_set_and_loads_its_clips(tmp_path: Path) -> None:
+def test_clips_of_seeds_are_made_once_and_kept_by_version_and_kinds(rendering: Rendering, tmp_path: Path) -> None:
     console = Console(record=True, width=200)
-    chosen = choose(Choice(None, "1000:1002", cache=tmp_path, pattern="*1001*"), console)
-    assert [clip.name for clip in chosen.clips] == ["s1001_000_point"]
-    assert chosen.seeds == "1000:1002"
+    for _ in range(2):
+        chosen = choose(Choice(None, "1000:1003", kinds=("point",), cache=tmp_path, jobs=2), console)
+    assert [clip.name for clip in chosen.clips] == [f"s{seed}_000_point" for seed in (1000, 1001, 1002)]
+    assert rendering.rendered == [clip.name for clip in chosen.clips]
+    assert (chosen.seeds, chosen.folder) == ("1000:1003", tmp_path / "9.9" / "point")
     assert "the set 'choosing'" in console.export_text()
+
+
+@pytest.mark.usefixtures("rendering")
+def test_clips_of_seeds_are_chosen_by_name_too(tmp_path: Path) -> None:
+    chosen = choose(Choice(None, "1000:1002", "*1001*", cache=tmp_path, jobs=2), Console(file=io.StringIO()))
+    assert [clip.name for clip in chosen.clips] == ["s1001_000_quiet"]
     with pytest.raises(ClipError, match="is named x"):
-        choose(Choice(None, "1000:1002", cache=tmp_path, pattern="x"), console)
+        choose(Choice(None, "1000:1002", "x", cache=tmp_path, jobs=2), Console(file=io.StringIO()))
+
+
+def test_what_cannot_be_rendered_is_said(rendering: Rendering, tmp_path: Path) -> None:
+    console = Console(file=io.StringIO())
+    with pytest.raises(ClipError, match="1 clips were not rendered: s1003_000_quiet: no lamp"):
+        choose(Choice(None, "1003:1004", cache=tmp_path, jobs=2), console)
+    with pytest.raises(ClipError, match="--kinds: 'dance' is none of point, quiet"):
+        choose(Choice(None, "1003:1004", kinds=("dance",), cache=tmp_path, jobs=2), console)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ClipError, match="cannot be kept in"):
+        choose(Choice(None, "1000:1001", cache=tmp_path / "file", jobs=2), console)
+    rendering.stopped = True
+    with pytest.raises(KeyboardInterrupt):
+        choose(Choice(None, "1000:1001", cache=tmp_path, jobs=2), console)
 
 
 @pytest.mark.parametrize(
