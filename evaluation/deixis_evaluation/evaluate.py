@@ -33,12 +33,16 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True)
 class EvaluationOptions:
-    """How clips are played. `out` is the folder that gets NAME.jsonl, `sets` are settings of stages."""
+    """How clips are played. `out` is the folder that gets NAME.jsonl, `sets` are settings of stages.
+
+    `site`: a site file to play clips with, in place of one made from the truth; `sets` then name source and registry.
+    """
 
     stages: tuple[str, ...]
     lockstep: bool = False
     out: Path | None = None
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    site: Path | None = None
 
 
 def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[], None] | None = None) -> ClipScore:
@@ -48,7 +52,7 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
     """
     # A folder directly below the system's temporary one: the POI registry is made anew for each clip.
     with tempfile.TemporaryDirectory(prefix="deixis-eval-") as folder:
-        site = write_site(clip, Path(folder))
+        site = options.site or write_site(clip, Path(folder))
         out = options.out or Path(folder)
         result = _play(clip, site, out, options, on_frame)
         if result.signal is not None:

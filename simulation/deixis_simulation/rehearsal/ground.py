@@ -109,7 +109,7 @@ def ground_of(site: Site) -> Ground:
     near = tuple(poi for poi in pois if math.hypot(*poi.on_floor) <= FARTHEST_M and abs(poi.position_m[2]) <= FARTHEST_M)
     if not near:
         raise RehearsalError(
-            f"site file {site.path}: pois: all are more than {FARTHEST_M:g} m from the robot; is robot_pose right?"
+            f"site file {site.path}: pois: all are beyond {FARTHEST_M:g} m from the robot; is robot_pose right?"
         )
     if len(site.walls) > MOST_WALLS_DRAWN:
         notes.append(f"of {len(site.walls)} walls the {MOST_WALLS_DRAWN} nearest are drawn; all of them hide POIs")

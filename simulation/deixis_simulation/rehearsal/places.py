@@ -61,7 +61,7 @@ def chosen_places(ground: Ground, number: int) -> list[Place]:
     free = _grid(ground)
     if not free:
         raise RehearsalError(
-            f"the camera sees no place {NEAREST_CHOSEN_M} to {FARTHEST_CHOSEN_M} m off where somebody could stand with head and "
+            f"the camera sees no place {NEAREST_CHOSEN_M} to {FARTHEST_CHOSEN_M} m off where one could stand with head and "
             "chest in the picture and see a POI: are camera.mount (height, pitch_up_deg, yaw_deg), robot_pose and walls right?"
         )
     ahead = _ahead(ground)

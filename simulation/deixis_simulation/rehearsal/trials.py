@@ -22,6 +22,7 @@ from .ground import MOST_WALLS_DRAWN, Ground, GroundPoi, Point, Wall
 from .places import Place
 
 START_S = 1.0
+LONGEST_HOLD_S = 2.1
 TAIL_S = 0.9
 """After the hand is down: the answer is given a moment after the stroke."""
 MARGIN_M = 0.6
@@ -105,7 +106,7 @@ def _action(dice: Dice, ground: Ground, place: Place, aim: Aim | None, heading_d
     if aim is None:
         return draw_quiet(dice, START_S)
     front = wrap_deg(heading_deg - heading_to(place.position_m, ground.camera_foot))
-    return draw_pointing(dice, START_S, Target(aim.poi.poi_id, wrap_deg(aim.azimuth_deg - front)))
+    return draw_pointing(dice, START_S, Target(aim.poi.poi_id, wrap_deg(aim.azimuth_deg - front)), LONGEST_HOLD_S)
 
 
 def room_of(ground: Ground) -> Room:
