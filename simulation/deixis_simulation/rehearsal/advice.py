@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -32,6 +32,7 @@ HIDDEN: dict[Hidden, str] = {
     "behind": "lies at the back of people who face the robot",
     "here": "stands where the person stands",
 }
+MOST_OTHERS = 3
 MOST_CLOSE = 12
 """Close pairs that are spoken of; how many more there are is said."""
 
@@ -54,14 +55,14 @@ def advise(ground: Ground, aims: Sequence[Aim], confusion: Confusion | None) -> 
     return [*_failures(confusion), *_false(confusion), *_results(confusion), *said]
 
 
-def told(result: PoiResult, names: dict[str, str]) -> str:
-    """What became of a POI's tries, as half a sentence: 'confused with the clock (2); the hand's direction was misread (2)'."""
-    others = ", ".join(f"{names.get(other, other)} ({times})" for other, times in result.confused_with.most_common(3))
-    parts = [f"confused with {others}"] if others else []
+def instead(result: PoiResult, names: dict[str, str]) -> str:
+    """What was answered besides the POI, the most frequent first: 'the clock 2, nothing 1'."""
+    parts = [f"{names.get(other, other)} {times}" for other, times in result.confused_with.most_common(MOST_OTHERS)]
+    if len(result.confused_with) > MOST_OTHERS:
+        parts.append("others")
     if result.outcomes["missed"]:
-        parts.append(f"no answer {_times(result.outcomes['missed'])}")
-    causes = [f"{CAUSES[cause]} ({times})" for cause, times in result.causes.most_common(2)]
-    return "; ".join([*parts, *causes])
+        parts.append(f"nothing {result.outcomes['missed']}")
+    return ", ".join(parts)
 
 
 def _hidden(ground: Ground, aims: Sequence[Aim]) -> list[Advice]:
@@ -151,14 +152,16 @@ def _small(ground: Ground, place: Place, _: Sequence[Aim]) -> Advice | None:
 
 
 def _results(confusion: Confusion) -> list[Advice]:
+    """Why POIs are not told apart."""
     names = {result.poi.poi_id: result.poi.name for result in confusion.results}
-    advice = []
-    for result in confusion.results:
-        if result.verdict in ("tied", "confused"):
-            named = f"{_capital(result.poi.name)} was named {result.outcomes['named']} of {result.tries} times"
-            text = f"{named}: {told(result, names)}."
-            advice.append(Advice("confused", text, (result.poi.poi_id, *result.confused_with)))
-    return advice
+    return [_result(result, names) for result in confusion.results if result.verdict in ("tied", "confused")]
+
+
+def _result(result: PoiResult, names: dict[str, str]) -> Advice:
+    named = f"{_capital(result.poi.name)} was named {result.outcomes['named']} of {result.tries} times"
+    why = ", ".join(f"{CAUSES[cause]} ({times})" for cause, times in result.causes.most_common())
+    text = f"{named}; answered instead: {instead(result, names)}. Why: {why}."
+    return Advice("confused", text, (result.poi.poi_id, *result.confused_with))
 
 
 def _false(confusion: Confusion) -> list[Advice]:
@@ -173,7 +176,9 @@ def _false(confusion: Confusion) -> list[Advice]:
 
 
 def _failures(confusion: Confusion) -> list[Advice]:
-    return [Advice("failed", f"{trial} could not be tried: {why}.") for trial, why in confusion.failures]
+    """Each reason once."""
+    reasons = Counter(why for _, why in confusion.failures)
+    return [Advice("failed", f"{number} of the clips could not be tried: {why}.") for why, number in reasons.most_common()]
 
 
 def _by_poi(aims: Sequence[Aim]) -> dict[GroundPoi, list[Aim]]:
@@ -197,7 +202,3 @@ def _capital(text: str) -> str:
 
 def _and(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def _times(number: int) -> str:
-    return {1: "once", 2: "twice"}.get(number, f"{number} times")

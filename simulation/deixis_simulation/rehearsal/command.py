@@ -36,6 +36,7 @@ from .trials import Trial, plan_trials
 
 NOT_ALL_TOLD_APART = 3
 STOPPED = 130
+FAILURES_AT_FIRST = 3
 MOST_TRIALS = 5000
 RENDER_S_PER_MEGAPIXEL = 0.35
 PLAY_S_PER_FRAME = 0.03
@@ -180,10 +181,17 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
         try:
             for answer in perform(plan.trials, stage, render_clip, given.jobs):
                 answers.append(answer)
+                _refuse_to_go_on(answers)
                 progress.update(task, advance=1, description=escape(f"{names[answer.trial]}: {in_words(answer)}"))
         except (Interrupted, KeyboardInterrupt):
             return True
     return False
+
+
+def _refuse_to_go_on(answers: list[Answer]) -> None:
+    """Where nothing works at first, nothing will. Raises CommandError with the reason."""
+    if len(answers) == FAILURES_AT_FIRST and all(answer.failure is not None for answer in answers):
+        raise CommandError(f"none of the first {FAILURES_AT_FIRST} clips could be tried: {answers[-1].failure}")
 
 
 def in_words(answer: Answer) -> str:

@@ -20,10 +20,9 @@ from typing import Any
 from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.padding import Padding
 from rich.table import Table
 
-from .advice import Advice, told
+from .advice import Advice, instead
 from .aims import Aim, close_pairs, face_px
 from .confusion import Confusion, PoiResult, Verdict
 from .ground import Ground
@@ -50,10 +49,12 @@ def print_report(console: Console, places: Sequence[Place], confusion: Confusion
 
 
 def print_advice(console: Console, advice: Sequence[Advice]) -> None:
-    """The sentences, each with a dash."""
+    """The sentences, one below the other."""
+    grid = Table.grid(padding=(0, 1))
     for item in advice:
-        console.print(Padding(f"• {escape(item.text)}", (0, 0, 0, 1)), highlight=False)
+        grid.add_row(" •", escape(item.text))
     if advice:
+        console.print(grid, highlight=False)
         console.print()
 
 
@@ -74,12 +75,12 @@ def result_table(places: Sequence[Place], confusion: Confusion) -> Table:
     table.add_column("95 %", justify="right", no_wrap=True, style="dim")
     for place in places:
         table.add_column(place.words.replace(" (", "\n("), justify="center", no_wrap=True)
-    table.add_column("instead")
+    table.add_column("answered instead")
     names = {result.poi.poi_id: result.poi.name for result in confusion.results}
     for result in confusion.results:
         cells = [_at_place(confusion.at_places.get((place.letter, result.poi.poi_id))) for place in places]
         state = f"[{STYLES[result.verdict]}]{WORDS[result.verdict]}[/]"
-        table.add_row(escape(result.poi.name), state, *_share(result), *cells, escape(told(result, names)))
+        table.add_row(escape(result.poi.name), state, *_share(result), *cells, escape(instead(result, names)))
     return table
 
 

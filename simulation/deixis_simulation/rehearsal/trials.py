@@ -54,9 +54,8 @@ class Trial:
 
     @property
     def words(self) -> str:
-        """As it is spoken of."""
-        doing = f"points at {self.aim.poi.name}" if self.aim is not None else "does not point"
-        return f"{self.scene.people[0].avatar} at {self.place.letter} {doing}"
+        """Place and POI, in a few words."""
+        return f"{self.place.letter}, {self.aim.poi.name if self.aim is not None else 'no pointing'}"
 
 
 def plan_trials(ground: Ground, aims: Sequence[Aim], *, count: int, seed: int, avatars: Sequence[str]) -> list[Trial]:
