@@ -1,8 +1,8 @@
 """Scenes at random: scene `index` of a seed is the same wherever and in whatever order it is drawn.
 
 Each part of a scene has its own stream of random numbers, so that one more number drawn in one leaves the others alone. What a
-caller fixes (size, field of view) is put in place of what was drawn after that was drawn: with another size it is the same scene.
-With another field of view persons and camera stand elsewhere, since they have to fit the picture.
+caller fixes (size, field of view) takes the place of what was drawn, after that was drawn: with another size it is the same
+scene. With another field of view persons and camera may stand elsewhere, since they have to fit the picture.
 """
 
 from __future__ import annotations

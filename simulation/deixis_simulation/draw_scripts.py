@@ -89,7 +89,9 @@ def draw_script(dice: Dice, plan: Plan, standing: Standing, pois: Sequence[Scene
     return row if _end_s(row) <= LONGEST_S - 0.3 else None
 
 
-def draw_others(dice: Dice, plan: Plan, bodies: Sequence[Body], places: Sequence[Place], pois: Sequence[ScenePoi]) -> list[Person]:
+def draw_others(
+    dice: Dice, plan: Plan, bodies: Sequence[Body], places: Sequence[Place], pois: Sequence[ScenePoi]
+) -> list[Person]:
     """The company of the first person: gesture, look about or stand; sometimes one more points."""
     people = []
     for number, (body, place) in enumerate(zip(bodies, places, strict=True)):

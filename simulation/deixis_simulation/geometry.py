@@ -96,16 +96,15 @@ class View:
     def project(self, points: Floats) -> Floats:
         """World points (..., 3) to pixels (..., 2); meaningless behind the camera."""
         seen = self.in_camera(points) @ self.matrix.T
-        return seen[..., :2] / seen[..., 2:]
+        pixels: Floats = seen[..., :2] / seen[..., 2:]
+        return pixels
 
 
 def view_at(camera: Camera, robot: RobotState) -> View:
     """What the camera sees when the robot is there."""
     yaw = math.radians(robot.yaw_deg)
     x, y, z = camera.position_m
-    centre = np.array(
-        [robot.x_m + math.cos(yaw) * x - math.sin(yaw) * y, robot.y_m + math.sin(yaw) * x + math.cos(yaw) * y, z]
-    )
+    centre = np.array([robot.x_m + math.cos(yaw) * x - math.sin(yaw) * y, robot.y_m + math.sin(yaw) * x + math.cos(yaw) * y, z])
     # base_link -> camera body (x ahead, y left, z up): yaw to the left, pitch up, then roll clockwise seen from behind.
     body = Rotation.from_euler("ZYX", [robot.yaw_deg + camera.yaw_deg, -camera.pitch_up_deg, camera.roll_deg], degrees=True)
     optical_of_body = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
