@@ -12,7 +12,7 @@ from deixis_runtime.host import chosen_stages
 from deixis_runtime.site import load_site
 from deixis_simulation.rehearsal.aims import aims_of
 from deixis_simulation.rehearsal.ground import ground_of
-from deixis_simulation.rehearsal.performance import Stage, perform
+from deixis_simulation.rehearsal.performance import Stage, play_trial
 from deixis_simulation.rehearsal.places import given_places
 from deixis_simulation.rehearsal.trials import plan_trials
 from running import POINTED_AT, ROOT, SITE
@@ -48,15 +48,8 @@ def test_a_clip_is_answered_with_the_sites_own_pois(tmp_path: Path) -> None:
     asked = next(trial for trial in trials if trial.aim is not None and trial.aim.poi.poi_id == POINTED_AT)
     for suffix in (".mp4", ".json"):
         shutil.copy(ROOT / "examples" / "clips" / f"pointing{suffix}", tmp_path / f"{asked.scene.name}{suffix}")
-
-    def render(*_: object) -> None:
-        raise AssertionError("the clip is there already")
-
-    stage = Stage(SITE, ground, aims, tmp_path, chosen_stages((), ()))
-    answers = list(perform([asked], stage, render, 1))
-    assert [(item.asked, item.poi_ids, item.outcome, item.failure) for item in answers] == [
-        (POINTED_AT, (POINTED_AT,), "named", None)
-    ]
+    answer = play_trial(asked, Stage(SITE, ground, aims, tmp_path, chosen_stages((), ())))
+    assert (answer.asked, answer.poi_ids, answer.outcome, answer.failure) == (POINTED_AT, (POINTED_AT,), "named", None)
 
 
 def test_plan_needs_no_renderer(tmp_path: Path) -> None:

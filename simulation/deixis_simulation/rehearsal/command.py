@@ -20,9 +20,11 @@ from deixis_evaluation.evaluate import Interrupted
 from deixis_runtime.host import chosen_stages
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ..avatars import FITTING_AVATARS, HELD_OUT_AVATARS
+from ..jobs import Interrupted as RenderingInterrupted
+from ..scene import Scene
 from .advice import advise
 from .aims import Aim, aims_of
 from .answers import Answer
@@ -169,22 +171,32 @@ def _rehearse(console: Console, given: argparse.Namespace, plan: Plan, out: Path
 
 def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[Answer]) -> bool:
     """Fill `answers`; whether it was stopped before the end."""
-    from ..clip import render_clip  # noqa: PLC0415  here, for it needs OpenGL, which a plan does not
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     names = {trial.scene.name: trial.words for trial in plan.trials}
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    left = {trial.scene.name: trial.scene.frames for trial in plan.trials}
+    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=600) as progress:
         minutes = math.ceil(estimate_s(plan.trials, given.jobs) / 60)
         say = progress.console.print
         say(f"{len(plan.trials)} clips, about {minutes} min with {given.jobs} jobs; Ctrl-C ends with what there is until then")
-        task = progress.add_task("rendering", total=len(plan.trials))
+        task = progress.add_task("rendering", total=sum(left.values()))
+
+        def hear(answer: Answer) -> None:
+            answers.append(answer)
+            _refuse_to_go_on(answers)
+            said = f"{len(answers)} of {len(left)}: {names[answer.trial]}: {in_words(answer)}"
+            # Clips that were there already, or failed, have frames that nobody counted.
+            progress.update(task, description=escape(said), advance=left[answer.trial])
+
+        def tick(scene: Scene) -> None:
+            left[scene.name] -= 1
+            progress.advance(task)
+
         try:
-            for answer in perform(plan.trials, stage, render_clip, given.jobs):
-                answers.append(answer)
-                _refuse_to_go_on(answers)
-                progress.update(task, advance=1, description=escape(f"{names[answer.trial]}: {in_words(answer)}"))
-        except (Interrupted, KeyboardInterrupt):
+            perform(plan.trials, stage, given.jobs, hear, tick)
+        except (RenderingInterrupted, Interrupted, KeyboardInterrupt):
             return True
+        except OSError as error:
+            raise CommandError(f"'{stage.clips}': {error.strerror or error}") from None
     return False
 
 

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,14 +15,13 @@ from deixis_evaluation.truth_site import calibration_content
 from deixis_runtime.host import SOURCE
 from deixis_schemas import topics
 
+from ..clip_files import ClipFiles
+from ..jobs import Progress, render_all
 from ..scene import Scene
 from .aims import Aim
 from .answers import Answer, answer_of
 from .ground import Ground
 from .trials import Trial
-
-Renderer = Callable[[Scene, Path], None]
-"""Writes NAME.mp4 and, last, NAME.json of a scene into a folder. Must be picklable: it runs in another process."""
 
 
 @dataclass(frozen=True)
@@ -43,30 +36,34 @@ class Stage:
     sets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def perform(trials: Sequence[Trial], stage: Stage, render: Renderer, jobs: int) -> Iterator[Answer]:
-    """Answers to all trials, in the order in which their clips are ready; clips that are there already are played first.
+def perform(
+    trials: Sequence[Trial], stage: Stage, jobs: int, hear: Callable[[Answer], None], tick: Callable[[Scene], None]
+) -> None:
+    """Tell `hear` the answer to each trial, in the order in which clips are ready; `tick` is called for each frame rendered.
 
-    Raises Interrupted or KeyboardInterrupt when stopped; what was yielded before stands.
+    Clips that are there already are played first. Raises Interrupted (of jobs or of evaluate) when stopped; what was heard
+    until then stands. OSError where the folder cannot be written.
     """
-    ready = [trial for trial in trials if _is_rendered(trial, stage.clips)]
-    for trial in ready:
-        yield play_trial(trial, stage)
-    wanted = [trial for trial in trials if trial not in ready]
-    if not wanted:
-        return
-    with _renderers(min(jobs, len(wanted))) as pool:
-        rendered = {pool.submit(render, trial.scene, stage.clips): trial for trial in wanted}
-        for future in as_completed(rendered):
-            trial = rendered[future]
-            failure = _failure(future)
-            yield play_trial(trial, stage) if failure is None else _unplayed(trial, failure)
+    of_scene = {trial.scene.name: trial for trial in trials}
+
+    # Played from here, between two messages of the renderers: these go on meanwhile, and one is not replaced until the clip
+    # is over, so that the system has its processor.
+    def play(scene: Scene) -> None:
+        hear(play_trial(of_scene[scene.name], stage))
+
+    def fail(scene: Scene, why: str) -> None:
+        hear(_unplayed(of_scene[scene.name], why))
+
+    progress = Progress(frame=tick, ends=play, skips=play, fails=fail)
+    render_all([trial.scene for trial in trials], stage.clips, jobs=jobs, progress=progress)
 
 
 def play_trial(trial: Trial, stage: Stage) -> Answer:
     """Play one clip to the system with the site's own file. What goes wrong stands in the answer. Raises Interrupted."""
     name = trial.scene.name
     try:
-        clip = Clip(name, stage.clips / f"{name}.mp4", load_truth(stage.clips / f"{name}.json"))
+        files = ClipFiles(stage.clips, name)
+        clip = Clip(name, files.video, load_truth(files.truth))
     except ClipError as error:
         return _unplayed(trial, str(error))
     # A folder directly below the system's temporary one: each clip meets a registry that holds the site's POIs alone.
@@ -89,38 +86,6 @@ def settings_for(clip: Clip, ground: Ground, folder: Path, given: Mapping[str, t
     registry = f"registry={quoted(str(folder / 'pois.sqlite'))}"
     # Behind what was given: a rehearsal plays its clips whatever the user sets.
     return {**given, SOURCE: (*given.get(SOURCE, ()), *camera), keeper: (*given.get(keeper, ()), registry)}
-
-
-def _is_rendered(trial: Trial, folder: Path) -> bool:
-    return all((folder / f"{trial.scene.name}{suffix}").exists() for suffix in (".mp4", ".json"))
-
-
-@contextmanager
-def _renderers(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that render. Spawned, for OpenGL does not survive a fork; those at work are let go when we are stopped."""
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin_rendering)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _begin_rendering() -> None:
-    """In a rendering process: end quietly at Ctrl-C, and leave the other cores to the other processes."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.environ["LP_NUM_THREADS"] = "1"
-
-
-def _failure(future: Future[None]) -> str | None:
-    """Why a clip could not be rendered; none where it is there."""
-    try:
-        future.result()
-    except BrokenProcessPool:
-        return "the rendering process ended (out of memory, or OpenGL failed)"
-    except Exception as error:
-        return f"it could not be rendered: {error}"
-    return None
 
 
 def _unplayed(trial: Trial, failure: str) -> Answer:
