@@ -100,7 +100,7 @@ def test_advice_says_what_to_do(ground: Ground) -> None:
     said = {item.topic: item.text for item in advise(ground, aims, confusion)}
     assert said["close"].startswith("The vase and the clock lie 11° apart seen from A (2.0, 0.0)")
     assert said["close"].endswith("move one, or accept a tie.")
-    assert said["wall"] == "The cellar stands behind a wall seen from A (2.0, 0.0): nobody points at it from there."
+    assert said["wall"] == "Seen from A (2.0, 0.0), the cellar stands behind a wall: nobody points at it from there."
     assert said["confused"] == (
         "The door was named 0 of 1 times; answered instead: the vase 1. Why: the hand's direction was misread (1)."
     )

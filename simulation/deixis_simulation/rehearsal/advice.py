@@ -80,7 +80,7 @@ def _hidden(ground: Ground, aims: Sequence[Aim]) -> list[Advice]:
 def _hidden_text(poi: GroundPoi, words: str, places: Sequence[Place], views: int) -> str:
     if len(places) == views and views > 1:
         return f"{_capital(poi.name)} {words} from all places: nobody points at it where the camera sees people."
-    return f"{_capital(poi.name)} {words} seen from {_and([place.words for place in places])}: nobody points at it from there."
+    return f"Seen from {_and([place.words for place in places])}, {poi.name} {words}: nobody points at it from there."
 
 
 def _pairs(aims: Sequence[Aim], confusion: Confusion | None) -> list[Advice]:

@@ -6,6 +6,7 @@ are told apart, 3 when some are not, 1 when it could not be tried, 130 when stop
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import math
 import os
@@ -174,9 +175,10 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     names = {trial.scene.name: trial.words for trial in plan.trials}
     left = {trial.scene.name: trial.scene.frames for trial in plan.trials}
-    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=600) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, speed_estimate_period=600, disable=not console.is_terminal) as progress:
         minutes = math.ceil(estimate_s(plan.trials, given.jobs) / 60)
-        say = progress.console.print
+        say = functools.partial(console.print, markup=False, highlight=False, soft_wrap=True)
         say(f"{len(plan.trials)} clips, about {minutes} min with {given.jobs} jobs; Ctrl-C ends with what there is until then")
         task = progress.add_task("rendering", total=sum(left.values()))
 
@@ -186,6 +188,8 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
             said = f"{len(answers)} of {len(left)}: {names[answer.trial]}: {in_words(answer)}"
             # Clips that were there already, or failed, have frames that nobody counted.
             progress.update(task, description=escape(said), advance=left[answer.trial])
+            if not console.is_terminal:
+                say(said)
 
         def tick(scene: Scene) -> None:
             left[scene.name] -= 1

@@ -28,7 +28,7 @@ MEANINGS: dict[Verdict, str] = {
 }
 LEGEND_WIDTH_IN, LONGEST_IN, SHORTEST_IN, DPI = 2.6, 8.5, 4.5, 130
 KEY_IN = 2.2
-MARGIN_M = 0.5
+MARGIN_M = 0.6
 MOST_LINKS = 12
 
 
@@ -51,7 +51,7 @@ def draw_map(path: Path, ground: Ground, places: Sequence[Place], aims: Sequence
     _draw_links(axes, ground, aims, confusion)
     _draw_robot(axes, ground)
     _draw_places(axes, places)
-    _draw_pois(axes, ground, confusion)
+    _draw_pois(axes, ground, places, confusion)
     figure.text(0.15 / whole_w, 1 - 0.36 / whole_h, _title(ground, confusion), fontsize=12, weight="bold", color=INK)
     _draw_legend(figure, (width + 0.1) / whole_w, confusion)
     corner = figure.add_axes(((width + 0.2) / whole_w, 0.1 / whole_h, KEY_IN / whole_w, KEY_IN / whole_h))
@@ -140,26 +140,33 @@ def _draw_places(axes: Axes, places: Sequence[Place]) -> None:
         axes.annotate(place.letter, (x, y), ha="center", va="center", fontsize=9, weight="bold", color=PAPER, zorder=6)
 
 
-def _draw_pois(axes: Axes, ground: Ground, confusion: Confusion | None) -> None:
+def _draw_pois(axes: Axes, ground: Ground, places: Sequence[Place], confusion: Confusion | None) -> None:
+    """Each POI with its name on the side that looks away from the people, where no lines are."""
     results = {result.poi.poi_id: result for result in confusion.results} if confusion is not None else {}
+    middle = _middle([above(place.position_m) for place in places])
     for poi in ground.pois:
         x, y = above(poi.on_floor)
         result = results.get(poi.poi_id)
         colour = COLOURS[result.verdict if result is not None else "untried"]
         axes.plot(x, y, marker="D", markersize=10, color=colour, markeredgecolor=PAPER, markeredgewidth=1.2, zorder=7)
-        below = y < above(ground.camera_foot)[1]
+        dx, dy = x - middle[0], y - middle[1]
+        beside = abs(dx) > abs(dy)
         axes.annotate(
             f"{poi.name}{_score(result)}",
             (x, y),
-            xytext=(0, -10 if below else 10),
+            xytext=(math.copysign(9, dx), 0) if beside else (0, math.copysign(9, dy)),
             textcoords="offset points",
-            ha="center",
-            va="top" if below else "bottom",
+            ha=("left" if dx > 0 else "right") if beside else "center",
+            va="center" if beside else ("bottom" if dy > 0 else "top"),
             fontsize=8,
             color=INK,
             zorder=8,
             bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
         )
+
+
+def _middle(points: Sequence[Point]) -> Point:
+    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
 
 
 def _score(result: PoiResult | None) -> str:
