@@ -18,8 +18,12 @@ LONGEST_S = 7.0
 SHORTEST_S = 4.0
 CAMERA: Place = (0.0, 0.0)
 WALK_PACE_M_S = (0.8, 1.5)
-SETTLE_S = 0.5
-"""From the last step until the person stands and begins."""
+WALK_RAMPS_S = 0.6
+"""What starting and stopping add to the time that a way takes at full pace."""
+TURN_S, TURN_DEG_PER_S = 0.25, 200.0
+"""How long a walker takes to turn to where it faces then."""
+SETTLE_S = (-0.3, 0.4)
+"""Between the end of the walk and what follows: some begin while they still turn."""
 
 
 @dataclass(frozen=True)
@@ -137,14 +141,15 @@ def duration_of(dice: Dice, people: Sequence[Person]) -> float:
 def _draw_walk(dice: Dice, plan: Plan, standing: Standing) -> tuple[list[Action], float]:
     """The way there, if any, and when what follows begins."""
     start_s, speed = dice.between(0.5, 1.1, 2), dice.between(*WALK_PACE_M_S, 2)
-    glances, carries = dice.chance(0.5), dice.chance(0.3)
+    glances, carries, settle_s = dice.chance(0.5), dice.chance(0.3), dice.between(*SETTLE_S, 2)
     if not standing.walks:
         return [], start_s
     begin_s = dice.between(0, 0.4, 2)
     length = math.dist(standing.start, standing.place)
     if plan.plot == "through":
-        speed = max(speed, round(min(length / 6.0, 2.0), 2))
-    arrival_s = begin_s + length / speed
+        speed = max(speed, round(min(length / 5.5, 2.0), 2))
+    arrival_s = begin_s + length / speed + WALK_RAMPS_S
+    turn = wrap_deg(standing.heading_deg - heading_to(standing.start, standing.place))
     walk = Walk(
         start_s=begin_s,
         to_m=standing.place,
@@ -153,7 +158,7 @@ def _draw_walk(dice: Dice, plan: Plan, standing: Standing) -> tuple[list[Action]
         glance_s=(round(arrival_s * 0.35, 2), round(arrival_s * 0.65, 2)) if glances else None,
     )
     carried = _carried(dice, walk, arrival_s) if carries and plan.plot == "through" else []
-    return [walk, *carried], arrival_s + SETTLE_S
+    return [walk, *carried], arrival_s + TURN_S + abs(turn) / TURN_DEG_PER_S + settle_s
 
 
 def _carried(dice: Dice, walk: Walk, arrival_s: float) -> list[Action]:

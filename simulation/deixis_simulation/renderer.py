@@ -1,0 +1,355 @@
+"""Renders room and people on the CPU: OpenGL over EGL with Mesa's software renderer, no display and no GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any, Protocol
+
+import cv2
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from .geometry import Floats, View
+from .lights import MAX_LAMPS, Lighting
+from .room import Surface
+
+FloatPicture = NDArray[np.float32]
+
+SHADOW_TILE_PX = 512
+TILES = 4
+SAMPLES = 4
+NEAR_M, FAR_M = 0.05, 40.0
+BRIGHTEST = 30.0
+SHADOW_RADIUS_M = 1.3
+"""Around the middle of the people: what casts shadows; the rest of the room lies in the light."""
+ROOM_PASSES = 6
+"""Passes with other jitter that are averaged for a room that is rendered once."""
+SHADE_SCALE = 4
+"""Shadows of people on the room are soft: they are rendered at a quarter of the size."""
+
+
+class RenderError(RuntimeError):
+    """The renderer cannot work here; the text says what to install."""
+
+
+class Look(Protocol):
+    """How a person looks: constants of its mesh, and its pictures."""
+
+    triangles: NDArray[Any]
+    texture_coordinates: NDArray[Any]
+    part: NDArray[Any]
+    colours: NDArray[np.uint8]
+    normal_map: NDArray[np.uint8]
+    skin_mask: NDArray[np.uint8]
+
+
+class Posed(Protocol):
+    """A person's mesh at one time, world: vertices and unit normals (n, 3) float32."""
+
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Tints:
+    """Factors of a person's colours, red, green, blue."""
+
+    skin: Sequence[float] = (1.0, 1.0, 1.0)
+    hair: Sequence[float] = (1.0, 1.0, 1.0)
+    clothes: Sequence[float] = (1.0, 1.0, 1.0)
+
+
+@dataclass
+class _Drawn:
+    """Something on the graphics side. `person` is 0 for the room."""
+
+    positions: moderngl.Buffer
+    normals: moderngl.Buffer
+    seen: moderngl.VertexArray
+    depth: moderngl.VertexArray
+    label: moderngl.VertexArray
+    maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
+    uniforms: dict[str, Any]
+    person: int
+    casts_shadow: bool
+
+
+class Renderer:
+    """One scene's room and people. Not to be shared among threads or processes."""
+
+    def __init__(self, width: int, height: int) -> None:
+        """Raises RenderError where there is no OpenGL over EGL."""
+        self._size = width, height
+        try:
+            self._context = moderngl.create_context(standalone=True, backend="egl")
+        except Exception as error:  # moderngl raises bare Exception, whatever the cause is
+            raise RenderError(
+                f"no OpenGL over EGL here ({error}); on Debian: apt-get install libegl1 libgl1-mesa-dri"
+            ) from None
+        context = self._context
+        self._programs = {
+            "room": self._program("surface.vert", "surface.frag"),
+            "person": self._program("surface.vert", "surface.frag", define="PERSON"),
+            "depth": self._program("depth.vert", "depth.frag"),
+            "label": self._program("surface.vert", "label.frag"),
+        }
+        colour = context.renderbuffer(self._size, 4, samples=SAMPLES, dtype="f2")
+        self._sampled = context.framebuffer([colour], context.depth_renderbuffer(self._size, samples=SAMPLES))
+        self._resolved = context.framebuffer([context.texture(self._size, 4, dtype="f2")])
+        small = width // SHADE_SCALE, height // SHADE_SCALE
+        self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
+        self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
+        atlas = context.depth_texture((SHADOW_TILE_PX * TILES, SHADOW_TILE_PX * TILES))
+        atlas.compare_func, atlas.filter, atlas.repeat_x, atlas.repeat_y = "<=", (moderngl.LINEAR, moderngl.LINEAR), False, False
+        self._atlas, self._shadows = atlas, context.framebuffer(depth_attachment=atlas)
+        self._white = self._texture(np.full((4, 4, 3), 255, np.uint8))
+        self._flat = self._texture(np.full((4, 4, 3), (128, 128, 255), np.uint8))
+        context.enable(moderngl.DEPTH_TEST)
+        context.depth_func = "<="
+        self._room: list[_Drawn] = []
+        self._people: list[_Drawn] = []
+        self._lighting: Lighting | None = None
+        self._matrices: list[Floats] = []
+        self._jitters = np.random.default_rng(5).integers(0, 300, (12, 2)).astype(float)
+
+    def close(self) -> None:
+        """Give the context's memory back."""
+        self._context.release()
+
+    # --- what is in the scene -----------------------------------------------------------------------------------------
+
+    def add_room(self, surfaces: Sequence[Surface]) -> None:
+        """Add what stands still."""
+        for surface in surfaces:
+            shape = surface.shape
+            uniforms = {
+                "tint": tuple(surface.tint),
+                "roughness_of_surface": surface.roughness,
+                "gloss_of_surface": surface.gloss,
+                "emission": tuple(surface.emission),
+            }
+            look = self._white if surface.texture is None else self._texture(surface.texture)
+            mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
+            self._room.append(
+                self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow)
+            )
+
+    def add_person(self, look: Look, tints: Tints) -> None:
+        """Add a person; its number is the count of those before it."""
+        maps = self._texture(look.colours), self._texture(look.normal_map), self._texture(look.skin_mask)
+        uniforms = {
+            "tint": (1.0, 1.0, 1.0),
+            "emission": (0.0, 0.0, 0.0),
+            "skin_tint": tuple(tints.skin),
+            "hair_tint": tuple(tints.hair),
+            "clothes_tint": tuple(tints.clothes),
+        }
+        empty = np.zeros((len(look.part), 3))
+        mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
+        self._people.append(self._drawn("person", mesh, maps, uniforms, len(self._people) + 1, True))
+
+    def pose(self, meshes: Sequence[Posed]) -> None:
+        """Put the people where they are now, in their order."""
+        for drawn, mesh in zip(self._people, meshes, strict=True):
+            drawn.positions.write(np.ascontiguousarray(mesh.vertices, np.float32).tobytes())
+            drawn.normals.write(np.ascontiguousarray(mesh.normals, np.float32).tobytes())
+
+    def light(self, lighting: Lighting, centre: Floats, *, people: bool = True) -> None:
+        """Set the lamps, and draw their shadow maps around `centre` (world); `people` False: of the room alone."""
+        self._lighting = lighting
+        self._shadows.use()
+        self._shadows.clear(depth=1.0)
+        program = self._programs["depth"]
+        self._matrices = [_lamp_matrix(lamp.position, centre) for lamp in lighting.lamps]
+        casting = [drawn for drawn in (*self._room, *(self._people if people else ())) if drawn.casts_shadow]
+        for number, matrix in enumerate(self._matrices):
+            column, row = number % TILES, number // TILES
+            self._context.viewport = (column * SHADOW_TILE_PX, row * SHADOW_TILE_PX, SHADOW_TILE_PX, SHADOW_TILE_PX)
+            program["view_projection"].write(_uniform(matrix.T))
+            for drawn in casting:
+                drawn.depth.render()
+
+    # --- pictures -----------------------------------------------------------------------------------------------------
+
+    def room(self, view: View, passes: int = ROOM_PASSES) -> FloatPicture:
+        """The room without people (h, w, 3), linear; light() decides whose shadows fall into it."""
+        pictures = [self._pass(view, self._room, self._sampled, jitter)[..., :3] for jitter in self._jitters[:passes]]
+        return np.mean(pictures, axis=0, dtype=np.float32)
+
+    def shade(self, view: View) -> FloatPicture:
+        """The room without people at a quarter of the size: two of them, with and without people's shadows, give the shadows."""
+        pictures = [self._pass(view, self._room, self._small, jitter)[..., :3] for jitter in self._jitters[:2]]
+        return np.mean(pictures, axis=0, dtype=np.float32)
+
+    def people(self, view: View, jitter: int = 0) -> FloatPicture:
+        """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them."""
+        return self._pass(view, self._people, self._sampled, self._jitters[jitter % len(self._jitters)], behind=self._room)
+
+    def labels(self, view: View) -> NDArray[np.uint8]:
+        """Per pixel person << 5 | skin << 4 | part (h, w); 0 where there is nobody."""
+        self._labels.use()
+        self._context.viewport = (0, 0, *self._size)
+        self._labels.clear(0.0, 0.0, 0.0, 0.0)
+        program = self._programs["label"]
+        program["view_projection"].write(_uniform(_view_projection(view).T))
+        program["skin_mask"] = 2
+        for drawn in (*self._room, *self._people):
+            drawn.maps[2].use(2)
+            program["person"] = float(drawn.person)
+            drawn.label.render()
+        width, height = self._size
+        raw = np.frombuffer(self._labels.color_attachments[0].read(), np.uint8).reshape(height, width, 4)[::-1]
+        part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
+        packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
+        return np.where(person > 0, packed, 0).astype(np.uint8)
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _pass(
+        self, view: View, drawn: Sequence[_Drawn], target: moderngl.Framebuffer, jitter: Floats, behind: Sequence[_Drawn] = ()
+    ) -> FloatPicture:
+        matrix = _view_projection(view)
+        target.use()
+        self._context.viewport = (0, 0, *target.size)
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        if behind:
+            self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
+            for item in behind:
+                item.depth.render()
+        for name in {"person" if item.person else "room" for item in drawn}:
+            self._set_light(self._programs[name], matrix, view, jitter)
+        self._atlas.use(3)
+        for item in drawn:
+            program = self._programs["person" if item.person else "room"]
+            for unit, look in enumerate(item.maps):
+                look.use(unit)
+            for key, value in item.uniforms.items():
+                if key in program:
+                    program[key] = value
+            item.seen.render()
+        return self._read(target)
+
+    def _read(self, target: moderngl.Framebuffer) -> FloatPicture:
+        if target is self._sampled:
+            self._context.copy_framebuffer(self._resolved, self._sampled)
+            target = self._resolved
+        width, height = target.size
+        raw = np.frombuffer(target.color_attachments[0].read(), np.float16).reshape(height, width, 4)[::-1]
+        return np.clip(np.nan_to_num(raw.astype(np.float32), posinf=BRIGHTEST), 0, BRIGHTEST)
+
+    def _set_light(self, program: moderngl.Program, matrix: Floats, view: View, jitter: Floats) -> None:
+        assert self._lighting is not None, "light() comes before any picture"
+        lamps = self._lighting.lamps
+        padded = MAX_LAMPS - len(lamps)
+        values: dict[str, Any] = {
+            "view_projection": _uniform(matrix.T),
+            "lamp_position": _uniform([*(lamp.position for lamp in lamps), *np.zeros((padded, 3))]),
+            "lamp_colour": _uniform([*(lamp.colour for lamp in lamps), *np.zeros((padded, 3))]),
+            "lamp_matrix": _uniform([*(m.T for m in self._matrices), *np.tile(np.eye(4), (padded, 1, 1))]),
+            "lamp_softness": _uniform([*(lamp.softness for lamp in lamps), *np.zeros(padded)]),
+            "lamp_reach2": _uniform([*(lamp.reach2_m2 for lamp in lamps), *np.zeros(padded)]),
+            "camera": _uniform(view.centre),
+            "ambient_up": _uniform(self._lighting.ambient_up),
+            "ambient_down": _uniform(self._lighting.ambient_down),
+            "jitter": _uniform(jitter),
+        }
+        for name, value in values.items():
+            if name in program:
+                program[name].write(value)
+        numbers = {"lamps": len(lamps), "key_lamps": sum(lamp.key for lamp in lamps)}
+        units = {"albedo_map": 0, "normal_map": 1, "skin_mask": 2, "shadow_map": 3}
+        for name, number in (numbers | units).items():
+            if name in program:
+                program[name] = number
+
+    def _drawn(
+        self,
+        kind: str,
+        mesh: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]],
+        maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture],
+        uniforms: dict[str, Any],
+        person: int,
+        casts_shadow: bool,
+    ) -> _Drawn:
+        positions, normals, coordinates, part, triangles = mesh
+        buffer = self._context.buffer
+        moving = bool(person)
+        at = buffer(_uniform(positions), dynamic=moving)
+        up = buffer(_uniform(normals), dynamic=moving)
+        fixed = buffer(_uniform(np.hstack([coordinates, np.asarray(part, float)[:, None]])))
+        index = buffer(np.ascontiguousarray(triangles, np.int32).tobytes())
+        whole = [(at, "3f", "in_position"), (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
+
+        def array(program: str, content: list[tuple[Any, ...]]) -> moderngl.VertexArray:
+            return self._context.vertex_array(self._programs[program], content, index, skip_errors=True)
+
+        depth = array("depth", [(at, "3f", "in_position")])
+        return _Drawn(at, up, array(kind, whole), depth, array("label", whole), maps, uniforms, person, casts_shadow)
+
+    def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
+        content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])
+        height, width, channels = content.shape
+        texture = self._context.texture((width, height), channels, content.tobytes(), alignment=1)
+        texture.build_mipmaps()
+        texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+        return texture
+
+    def _program(self, vertex: str, fragment: str, define: str = "") -> moderngl.Program:
+        folder = files(__package__) / "shaders"
+        source = (folder / fragment).read_text(encoding="utf-8")
+        if define:
+            source = source.replace("#version 330\n", f"#version 330\n#define {define}\n", 1)
+        return self._context.program(vertex_shader=(folder / vertex).read_text(encoding="utf-8"), fragment_shader=source)
+
+
+def shadows_on(room: FloatPicture, plain: FloatPicture, shaded: FloatPicture) -> FloatPicture:
+    """The room with people's shadows: (h, w, 3) darkened by what two small pictures, without and with people, differ."""
+    share = np.clip((shaded + 0.003) / (plain + 0.003), 0, 1.03)
+    height, width = room.shape[:2]
+    soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_CUBIC)
+    return (room * soft).astype(np.float32)
+
+
+def over(people: FloatPicture, room: FloatPicture) -> FloatPicture:
+    """People (h, w, 4) in front of the room (h, w, 3)."""
+    return people[..., :3] + room * (1 - people[..., 3:])
+
+
+def _uniform(value: Any) -> bytes:
+    return np.ascontiguousarray(value, "f4").tobytes()
+
+
+def _view_projection(view: View) -> Floats:
+    """OpenCV's pinhole, pixel centres at integers, as OpenGL's clip space (row 0 of the read-back picture is flipped)."""
+    focal_x, focal_y, centre_x, centre_y = view.matrix[0, 0], view.matrix[1, 1], view.matrix[0, 2], view.matrix[1, 2]
+    projection = np.zeros((4, 4))
+    projection[0, 0], projection[0, 2] = 2 * focal_x / view.width, 2 * (centre_x + 0.5) / view.width - 1
+    projection[1, 1], projection[1, 2] = -2 * focal_y / view.height, 1 - 2 * (centre_y + 0.5) / view.height
+    projection[2, 2], projection[2, 3] = (FAR_M + NEAR_M) / (FAR_M - NEAR_M), -2 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
+    projection[3, 2] = 1
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = view.rotation, view.translation
+    return projection @ pose
+
+
+def _lamp_matrix(position: Floats, centre: Floats) -> Floats:
+    """A lamp looks at the people as a camera would; the cone just holds a ball around them."""
+    ahead = np.asarray(centre, float) - position
+    distance = float(np.linalg.norm(ahead))
+    ahead = ahead / distance
+    up = np.array((0.0, 1.0, 0.0)) if abs(ahead[1]) < 0.95 else np.array((0.0, 0.0, 1.0))
+    right = np.cross(ahead, up)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    zoom = 1 / np.tan(np.arcsin(min(SHADOW_RADIUS_M / distance, 0.93)))
+    near, far = max(0.25, distance - 1.3 * SHADOW_RADIUS_M), distance + 2.2 * SHADOW_RADIUS_M
+    projection = np.zeros((4, 4))
+    projection[0, 0] = projection[1, 1] = zoom
+    projection[2, 2], projection[2, 3] = (far + near) / (far - near), -2 * far * near / (far - near)
+    projection[3, 2] = 1
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, -rotation @ position
+    return projection @ pose
