@@ -93,4 +93,4 @@ def test_a_tiny_site_is_rehearsed(tmp_path: Path) -> None:
     assert result["pois"]["lamp"]["tries"] == 1
     assert len(list((tmp_path / "out" / "clips").glob("*.mp4"))) == 2
     assert (tmp_path / "out" / "map.png").exists()
-    assert "of 1 pointings were named" in done.stdout
+    assert "of 1 pointings." in done.stdout

@@ -137,7 +137,7 @@ def test_report_reads_as_json_and_on_screen(ground: Ground) -> None:
     console = Console(width=140, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
     print_report(console, places, confusion, advice)
     text = console.export_text()
-    assert "1 of 4 points of interest are told apart; 2 of 7 pointings were named." in text
+    assert "Told apart: 1 of 4 points of interest. Named: 2 of 7 pointings." in text
     assert "2 of 3" in text
 
 

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..avatars import FITTING_AVATARS, HELD_OUT_AVATARS
+from ..avatars import AVATARS
 from ..jobs import Interrupted as RenderingInterrupted
 from ..scene import Scene
 from .advice import advise
@@ -114,8 +114,7 @@ def _plan(given: argparse.Namespace) -> Plan:
     number = given.count * sum(aim.hidden is None for aim in aims) + len(places)
     if number > MOST_TRIALS:
         raise CommandError(f"that would be {number} clips, {MOST_TRIALS} at most: fewer places, or a smaller --count")
-    avatars = (*FITTING_AVATARS, *HELD_OUT_AVATARS)
-    return Plan(ground, places, aims, plan_trials(ground, aims, count=given.count, seed=given.seed, avatars=avatars))
+    return Plan(ground, places, aims, plan_trials(ground, aims, count=given.count, seed=given.seed, avatars=AVATARS))
 
 
 def _folder(given: argparse.Namespace) -> Path:
@@ -133,7 +132,8 @@ def _folder(given: argparse.Namespace) -> Path:
 
 def _introduce(console: Console, plan: Plan) -> None:
     where = ", ".join(place.words for place in plan.places)
-    console.print(f"[bold]{escape(plan.ground.name)}[/]: {len(plan.ground.pois)} points of interest, people at {where}")
+    pois = f"{len(plan.ground.pois)} point{'s' if len(plan.ground.pois) > 1 else ''} of interest"
+    console.print(f"[bold]{escape(plan.ground.name)}[/]: {pois}, people at {where}", highlight=False)
     for note in plan.ground.notes:
         console.print(f"  note: {escape(note)}", style="dim", highlight=False)
 

@@ -39,13 +39,9 @@ def print_report(console: Console, places: Sequence[Place], confusion: Confusion
     print_advice(console, advice)
     apart = sum(result.verdict == "told_apart" for result in confusion.results)
     style = "bold green" if confusion.all_told_apart else "bold yellow"
-    console.print(
-        f"{apart} of {len(confusion.results)} points of interest are told apart; "
-        f"{confusion.named} of {confusion.tries} pointings were named.",
-        style=style,
-        highlight=False,
-        soft_wrap=True,
-    )
+    told = f"Told apart: {apart} of {len(confusion.results)} points of interest."
+    named = f"Named: {confusion.named} of {confusion.tries} pointings."
+    console.print(f"{told} {named}", style=style, highlight=False, soft_wrap=True)
 
 
 def print_advice(console: Console, advice: Sequence[Advice]) -> None:

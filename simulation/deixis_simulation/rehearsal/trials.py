@@ -15,6 +15,7 @@ from ..draw_actions import Target, draw_pointing, draw_quiet
 from ..draw_bodies import draw_bodies
 from ..draw_lens import draw_sensor
 from ..draw_light import draw_light
+from ..draw_room import draw_room
 from ..geometry import wrap_deg
 from ..scene import ExhibitKind, Person, Pointing, Quiet, Room, Scene, ScenePoi, Tone
 from .aims import Aim
@@ -25,10 +26,9 @@ START_S = 1.0
 LONGEST_HOLD_S = 2.1
 TAIL_S = 0.9
 """After the hand is down: the answer is given a moment after the stroke."""
-MARGIN_M = 0.6
-"""Between what stands in a site and the box of walls around it."""
 TURNED_FROM_DEG = 100.0
 """People turn the body toward what lies farther to the side than this."""
+HIGHEST_CEILING_M = 20.0
 LEAST_FRONT_M = 4.0
 """The wall behind the people is at least so far from the camera."""
 
@@ -86,7 +86,7 @@ def _trial(ground: Ground, place: Place, aim: Aim | None, avatar: str, seed: int
         camera=ground.camera,
         sensor=draw_sensor(dice),
         light=draw_light(dice, duration_s, empty=False),
-        room=room_of(ground),
+        room=draw_site_room(dice, ground),
         pois=[_scene_poi(poi, i) for i, poi in enumerate(ground.pois)],
         people=[Person(**asdict(body), place_m=place.position_m, heading_deg=heading, actions=[action])],
     )
@@ -108,20 +108,14 @@ def _action(dice: Dice, ground: Ground, place: Place, aim: Aim | None, heading_d
     return draw_pointing(dice, START_S, Target(aim.poi.poi_id, wrap_deg(aim.azimuth_deg - front)), LONGEST_HOLD_S)
 
 
-def room_of(ground: Ground) -> Room:
-    """A box around all that stands in the site, a little beyond its walls, which are drawn themselves."""
-    inside: list[Point] = [(0.0, 0.0), ground.camera_foot, (ground.camera_foot[0] + LEAST_FRONT_M, 0.0)]
-    inside += [poi.on_floor for poi in ground.pois] + [end for wall in ground.walls for end in wall]
-    xs, ys = [x for x, _ in inside], [y for _, y in inside]
-    ceiling = max(3.0, *(poi.position_m[2] + 0.5 for poi in ground.pois))
-    return Room(
-        front_x_m=min(max(xs) + MARGIN_M, 99.0),
-        back_x_m=max(min(xs) - MARGIN_M, -99.0),
-        left_y_m=min(max(ys) + MARGIN_M, 99.0),
-        right_y_m=max(min(ys) - MARGIN_M, -99.0),
-        ceiling_m=min(ceiling, 20.0),
-        walls=_drawn_walls(ground.walls),
-    )
+def draw_site_room(dice: Dice, ground: Ground) -> Room:
+    """A room around all that stands in the site, whose look is not known; the site's own walls are drawn within it."""
+    reach: list[Point] = [(0.0, 0.0), ground.camera_foot, (ground.camera_foot[0] + LEAST_FRONT_M, 0.0)]
+    reach += [poi.on_floor for poi in ground.pois] + [_bounded(end) for wall in ground.walls for end in wall]
+    room = draw_room(dice, reach)
+    highest = max(poi.position_m[2] for poi in ground.pois) + 0.5
+    ceiling = min(max(room.ceiling_m, highest), HIGHEST_CEILING_M)
+    return room.model_copy(update={"walls": _drawn_walls(ground.walls), "ceiling_m": ceiling})
 
 
 def _drawn_walls(walls: Sequence[Wall]) -> list[Wall]:
@@ -131,7 +125,7 @@ def _drawn_walls(walls: Sequence[Wall]) -> list[Wall]:
 
 
 def _bounded(point: Point) -> Point:
-    return min(max(point[0], -98.0), 98.0), min(max(point[1], -98.0), 98.0)
+    return min(max(point[0], -95.0), 95.0), min(max(point[1], -95.0), 95.0)
 
 
 def _scene_poi(poi: GroundPoi, number: int) -> ScenePoi:
