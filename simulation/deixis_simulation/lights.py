@@ -12,7 +12,7 @@ from .geometry import Floats
 from .scene import Light, Scene
 
 MAX_LAMPS = 16
-FILLS = 7
+FILLS = 4
 EXPOSURE_RATE_HZ = 3.0
 """How fast the automatic exposure follows: share of the error taken back per second."""
 EXPOSURE_LIMITS = (0.4, 4.0)
@@ -89,14 +89,14 @@ def _fills(x: float, z: float, colour: Sequence[float], strength: float) -> list
 
 
 def _office(x: float, z: float) -> Lighting:
-    places = [(x + dx, 2.72, z + dz) for dz in (1.9, 0.1, 3.6) for dx in (-1.0, 1.0)]
-    keys = [_lamp(place, (1.0, 0.98, 0.93), 0.52, 0.035, 3.0) for place in places]
+    places = [(x + dx, 2.72, z + dz) for dz in (1.7, 0.1) for dx in (-1.1, 1.1)]
+    keys = [_lamp(place, (1.0, 0.98, 0.93), 0.7, 0.035, 3.0) for place in places]
     return _of(keys + _fills(x, z, (0.97, 1, 1.03), 0.75), (0.15, 0.15, 0.155), (0.10, 0.09, 0.08))
 
 
 def _window(x: float, z: float, side: int) -> Lighting:
     keys = [
-        _lamp((x + 2.9 * side, y, z + dz), (0.92, 1.0, 1.12), 0.62, 0.03, 8.0) for y in (1.2, 1.9) for dz in (0.6, 1.5, 2.4)
+        _lamp((x + 2.9 * side, y, z + dz), (0.92, 1.0, 1.12), 0.9, 0.03, 8.0) for y in (1.2, 1.9) for dz in (0.8, 2.2)
     ]
     keys.append(_lamp((x, 2.7, z + 1.0), (1.0, 0.86, 0.66), 0.35, 0.05, 3.0))
     return _of(keys + _fills(x, z, (1, 0.97, 0.94), 0.55), (0.13, 0.13, 0.14), (0.10, 0.09, 0.08))
@@ -104,8 +104,8 @@ def _window(x: float, z: float, side: int) -> Lighting:
 
 def _warm(x: float, z: float) -> Lighting:
     spots = ((-1.5, 2.0), (1.4, 1.7), (0.4, 3.4))
-    places = [(x + dx + apart, 2.6, z + dz) for dx, dz in spots for apart in (-0.12, 0.12)]
-    keys = [_lamp(place, (1.0, 0.86, 0.66), 0.6, 0.04, 5.2) for place in places]
+    places = [(x + dx, 2.6, z + dz) for dx, dz in spots]
+    keys = [_lamp(place, (1.0, 0.86, 0.66), 1.2, 0.05, 5.2) for place in places]
     return _of(keys + _fills(x, z, (1, 0.86, 0.66), 0.7), (0.14, 0.12, 0.09), (0.10, 0.08, 0.055))
 
 

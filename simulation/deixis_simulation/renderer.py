@@ -70,6 +70,7 @@ class _Drawn:
     normals: moderngl.Buffer
     seen: moderngl.VertexArray
     depth: moderngl.VertexArray
+    cover: moderngl.VertexArray
     label: moderngl.VertexArray
     maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
     uniforms: dict[str, Any]
@@ -91,14 +92,23 @@ class Renderer:
             ) from None
         context = self._context
         self._programs = {
-            "room": self._program("surface.vert", "surface.frag"),
-            "person": self._program("surface.vert", "surface.frag", define="PERSON"),
+            "room": self._program("surface.vert", "room.frag"),
+            "body": self._program("surface.vert", "body.frag"),
+            "person": self._program("screen.vert", "person.frag"),
+            "cover": self._program("depth.vert", "cover.frag"),
             "depth": self._program("depth.vert", "depth.frag"),
             "label": self._program("surface.vert", "label.frag"),
         }
         colour = context.renderbuffer(self._size, 4, samples=SAMPLES, dtype="f2")
         self._sampled = context.framebuffer([colour], context.depth_renderbuffer(self._size, samples=SAMPLES))
         self._resolved = context.framebuffer([context.texture(self._size, 4, dtype="f2")])
+        grey = context.renderbuffer(self._size, 1, samples=SAMPLES)
+        self._covering = context.framebuffer([grey], context.depth_renderbuffer(self._size, samples=SAMPLES))
+        self._covered = context.framebuffer([context.texture(self._size, 1)])
+        self._bodies = [context.texture(self._size, 4, dtype=kind) for kind in ("f2", "f2", "f2", "f4")]
+        self._body = context.framebuffer(self._bodies, context.depth_renderbuffer(self._size))
+        corners = context.buffer(_uniform([[-1, -1], [3, -1], [-1, 3]]))
+        self._screen = context.vertex_array(self._programs["person"], [(corners, "2f", "in_place")])
         small = width // SHADE_SCALE, height // SHADE_SCALE
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
         self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
@@ -141,15 +151,13 @@ class Renderer:
         """Add a person; its number is the count of those before it."""
         maps = self._texture(look.colours), self._texture(look.normal_map), self._texture(look.skin_mask)
         uniforms = {
-            "tint": (1.0, 1.0, 1.0),
-            "emission": (0.0, 0.0, 0.0),
             "skin_tint": tuple(tints.skin),
             "hair_tint": tuple(tints.hair),
             "clothes_tint": tuple(tints.clothes),
         }
         empty = np.zeros((len(look.part), 3))
         mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
-        self._people.append(self._drawn("person", mesh, maps, uniforms, len(self._people) + 1, True))
+        self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1, True))
 
     def pose(self, meshes: Sequence[Posed]) -> None:
         """Put the people where they are now, in their order."""
@@ -186,7 +194,18 @@ class Renderer:
 
     def people(self, view: View, jitter: int = 0) -> FloatPicture:
         """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them."""
-        return self._pass(view, self._people, self._sampled, self._jitters[jitter % len(self._jitters)], behind=self._room)
+        matrix = _view_projection(view)
+        cover = self._cover(matrix)
+        self._draw_bodies(matrix, view)
+        self._resolved.use()
+        self._context.disable(moderngl.DEPTH_TEST)
+        self._set_light(self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)])
+        for unit, (name, content) in enumerate(zip(("albedo_map", "normal_map", "flat_map", "position_map"), self._bodies, strict=True)):
+            content.use(unit + 4)
+            self._programs["person"][name] = unit + 4
+        self._screen.render()
+        self._context.enable(moderngl.DEPTH_TEST)
+        return _edged(self._read(self._resolved), cover)
 
     def labels(self, view: View) -> NDArray[np.uint8]:
         """Per pixel person << 5 | skin << 4 | part (h, w); 0 where there is nobody."""
@@ -208,29 +227,55 @@ class Renderer:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _pass(
-        self, view: View, drawn: Sequence[_Drawn], target: moderngl.Framebuffer, jitter: Floats, behind: Sequence[_Drawn] = ()
-    ) -> FloatPicture:
-        matrix = _view_projection(view)
+    def _pass(self, view: View, drawn: Sequence[_Drawn], target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
+        program = self._programs["room"]
         target.use()
         self._context.viewport = (0, 0, *target.size)
         target.clear(0.0, 0.0, 0.0, 0.0)
-        if behind:
-            self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
-            for item in behind:
-                item.depth.render()
-        for name in {"person" if item.person else "room" for item in drawn}:
-            self._set_light(self._programs[name], matrix, view, jitter)
-        self._atlas.use(3)
+        self._set_light(program, _view_projection(view), view, jitter)
         for item in drawn:
-            program = self._programs["person" if item.person else "room"]
-            for unit, look in enumerate(item.maps):
-                look.use(unit)
-            for key, value in item.uniforms.items():
-                if key in program:
-                    program[key] = value
+            self._set_look(program, item)
             item.seen.render()
         return self._read(target)
+
+    def _cover(self, matrix: Floats) -> FloatPicture:
+        """Share of each pixel (h, w, 1) that people cover."""
+        self._covering.use()
+        self._context.viewport = (0, 0, *self._size)
+        self._covering.clear(0.0, 0.0, 0.0, 0.0)
+        self._hide_behind_room(matrix)
+        self._programs["cover"]["view_projection"].write(_uniform(matrix.T))
+        for item in self._people:
+            item.cover.render()
+        self._context.copy_framebuffer(self._covered, self._covering)
+        width, height = self._size
+        raw = np.frombuffer(self._covered.color_attachments[0].read(alignment=1), np.uint8).reshape(height, width, 1)[::-1]
+        return raw.astype(np.float32) / np.float32(255)
+
+    def _draw_bodies(self, matrix: Floats, view: View) -> None:
+        self._body.use()
+        self._body.clear(0.0, 0.0, 0.0, 0.0)
+        self._hide_behind_room(matrix)
+        program = self._programs["body"]
+        program["view_projection"].write(_uniform(matrix.T))
+        program["camera"] = tuple(view.centre)
+        for item in self._people:
+            self._set_look(program, item)
+            item.seen.render()
+
+    def _hide_behind_room(self, matrix: Floats) -> None:
+        self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
+        for item in self._room:
+            item.depth.render()
+
+    def _set_look(self, program: moderngl.Program, item: _Drawn) -> None:
+        for unit, (name, look) in enumerate(zip(("albedo_map", "normal_map", "skin_mask"), item.maps, strict=True)):
+            look.use(unit)
+            if name in program:
+                program[name] = unit
+        for key, value in item.uniforms.items():
+            if key in program:
+                program[key] = value
 
     def _read(self, target: moderngl.Framebuffer) -> FloatPicture:
         if target is self._sampled:
@@ -259,11 +304,9 @@ class Renderer:
         for name, value in values.items():
             if name in program:
                 program[name].write(value)
-        numbers = {"lamps": len(lamps), "key_lamps": sum(lamp.key for lamp in lamps)}
-        units = {"albedo_map": 0, "normal_map": 1, "skin_mask": 2, "shadow_map": 3}
-        for name, number in (numbers | units).items():
-            if name in program:
-                program[name] = number
+        self._atlas.use(3)
+        program["lamps"], program["key_lamps"] = len(lamps), sum(lamp.key for lamp in lamps)
+        program["shadow_map"] = 3
 
     def _drawn(
         self,
@@ -286,8 +329,9 @@ class Renderer:
         def array(program: str, content: list[tuple[Any, ...]]) -> moderngl.VertexArray:
             return self._context.vertex_array(self._programs[program], content, index, skip_errors=True)
 
-        depth = array("depth", [(at, "3f", "in_position")])
-        return _Drawn(at, up, array(kind, whole), depth, array("label", whole), maps, uniforms, person, casts_shadow)
+        places = [(at, "3f", "in_position")]
+        depth, cover = array("depth", places), array("cover", places)
+        return _Drawn(at, up, array(kind, whole), depth, cover, array("label", whole), maps, uniforms, person, casts_shadow)
 
     def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
         content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])
@@ -297,12 +341,23 @@ class Renderer:
         texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
         return texture
 
-    def _program(self, vertex: str, fragment: str, define: str = "") -> moderngl.Program:
-        folder = files(__package__) / "shaders"
-        source = (folder / fragment).read_text(encoding="utf-8")
-        if define:
-            source = source.replace("#version 330\n", f"#version 330\n#define {define}\n", 1)
-        return self._context.program(vertex_shader=(folder / vertex).read_text(encoding="utf-8"), fragment_shader=source)
+    def _program(self, vertex: str, fragment: str) -> moderngl.Program:
+        return self._context.program(vertex_shader=_source(vertex), fragment_shader=_source(fragment))
+
+
+def _source(name: str) -> str:
+    """A shader of this package, with the files that it includes."""
+    folder = files(__package__) / "shaders"
+    lines = (folder / name).read_text(encoding="utf-8").splitlines()
+    return "\n".join(_source(line.split()[1]) if line.startswith("#include ") else line for line in lines) + "\n"
+
+
+def _edged(light: FloatPicture, cover: FloatPicture) -> FloatPicture:
+    """Light of whole pixels (h, w, 4) with smooth edges: pixels whose centre is free take the light of their neighbours."""
+    inside = light[..., 3:]
+    nearby = cv2.blur(light, (3, 3))
+    filled = np.where(inside > 0.5, light[..., :3], nearby[..., :3] / np.maximum(nearby[..., 3:], 1e-3))
+    return np.concatenate([filled * cover, cover], axis=2)
 
 
 def shadows_on(room: FloatPicture, plain: FloatPicture, shaded: FloatPicture) -> FloatPicture:

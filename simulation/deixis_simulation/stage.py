@@ -15,7 +15,7 @@ from .scene import Scene
 
 SHADOW_CENTRE_M = 1.05
 """Height of the middle of what casts shadows."""
-SHADOWS_STAND_M = 0.0012
+SHADOWS_STAND_M = 0.004
 """Below this motion of any vertex the shadow maps of the last frame are good enough."""
 SUBFRAMES = ((1.0, 1), (3.0, 2), (12.0, 4))
 """Motion blur: up to so many pixels of motion within the exposure, so many pictures are averaged; MOST beyond."""

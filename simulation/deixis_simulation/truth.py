@@ -58,7 +58,7 @@ class TruthWriter:
             "id": index,
             "phase": moment.phase,
             "gesture": moment.gesture,
-            "nonpoint_phase": moment.nonpoint_phase,
+            "nonpoint_phase": None if moment.nonpoint_phase == "none" else moment.nonpoint_phase,
             **self._target(moment, toward),
             "head": head_truth(moment.head_rotation, moment.head_centre, moment.eyes, view),
             "face": face_truth(

@@ -1,6 +1,10 @@
 #version 330
-out vec4 colour;
+// Nothing, in up to four pictures at once.
+layout(location = 0) out vec4 first;
+layout(location = 1) out vec4 second;
+layout(location = 2) out vec4 third;
+layout(location = 3) out vec4 fourth;
 
 void main() {
-  colour = vec4(0.0);
+  first = second = third = fourth = vec4(0.0);
 }

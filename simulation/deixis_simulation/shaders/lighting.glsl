@@ -1,14 +1,4 @@
-#version 330
-// Linear light from many lamps with shadow maps in one atlas of 4 x 4 tiles. PERSON: skin, hair and clothes; key lamps also shine.
-in vec3 position;
-in vec3 normal;
-in vec2 coordinate;
-in float part;
-out vec4 colour;
-
-uniform sampler2D albedo_map;
-uniform sampler2D normal_map;
-uniform sampler2D skin_mask;
+// Linear light from many lamps with shadow maps in one atlas of 4 x 4 tiles; key lamps also shine. Included by room.frag, person.frag.
 uniform sampler2DShadow shadow_map;
 uniform int lamps;
 uniform int key_lamps;
@@ -20,20 +10,10 @@ uniform float lamp_reach2[16];
 uniform vec3 camera;
 uniform vec3 ambient_up;
 uniform vec3 ambient_down;
-uniform vec3 tint;
-uniform float roughness_of_surface;
-uniform float gloss_of_surface;
-uniform vec3 emission;
 uniform vec2 jitter;
-uniform vec3 skin_tint;
-uniform vec3 hair_tint;
-uniform vec3 clothes_tint;
 
 // Interleaved gradient noise: the soft shadow's taps turn from pixel to pixel, and several passes with other jitter average it.
 float noise(vec2 at) { return fract(52.9829189 * fract(dot(at, vec2(0.06711056, 0.00583715)))); }
-
-// An approximation of the sRGB curve.
-vec3 linear(vec3 c) { return c * (c * (c * 0.3053 + 0.6822) + 0.0125); }
 
 float lit(int lamp, vec4 at, vec2 turn, float taps) {
   vec4 clip = lamp_matrix[lamp] * at;
@@ -49,36 +29,9 @@ float lit(int lamp, vec4 at, vec2 turn, float taps) {
   return 0.5 * (first + texture(shadow_map, vec3(tile + clamp(place.xy - offset * 0.7, 0.01, 0.99) * 0.25, depth)));
 }
 
-void main() {
-  vec3 albedo = linear(texture(albedo_map, coordinate).rgb) * tint;
+// Light from `position` to the camera; n is the bumped normal, flat_normal that of the mesh; skin is 0 to 1.
+vec3 shade(vec3 position, vec3 n, vec3 flat_normal, vec3 albedo, float skin, float roughness, float gloss) {
   vec3 to_camera = normalize(camera - position);
-  vec3 flat_normal = normalize(normal);
-  vec3 n = flat_normal;
-  float roughness = roughness_of_surface;
-  float gloss = gloss_of_surface;
-  float skin = 0.0;
-#ifdef PERSON
-  bool hand = part > 2.5 && part < 4.5;
-  bool eye = part > 90.0;
-  skin = texture(skin_mask, coordinate).r;
-  if (hand) skin = max(skin, 0.9);
-  if (part > 6.5) skin = 0.0;
-  vec3 other = part < 1.5 ? hair_tint : clothes_tint;
-  albedo *= mix(other, skin_tint, skin);
-  roughness = mix(0.75, 0.47, skin);
-  gloss = mix(0.25, 0.8, skin);
-  if (eye) { roughness = 0.12; gloss = 1.6; albedo = linear(texture(albedo_map, coordinate).rgb) * 0.8; skin = 0.0; }
-  if (dot(flat_normal, to_camera) < 0.0) flat_normal = -flat_normal;
-  // Tangents from screen-space derivatives: the packed avatars carry none.
-  vec3 dpx = dFdx(position), dpy = dFdy(position);
-  vec2 dux = dFdx(coordinate), duy = dFdy(coordinate);
-  vec3 py = cross(dpy, flat_normal), px = cross(flat_normal, dpx);
-  vec3 t = py * dux.x + px * duy.x, b = py * dux.y + px * duy.y;
-  float scale = inversesqrt(max(max(dot(t, t), dot(b, b)), 1e-20));
-  vec3 bump = texture(normal_map, coordinate).xyz * 2.0 - 1.0;
-  bump.xy *= 0.8;
-  n = normalize(t * scale * bump.x - b * scale * bump.y + flat_normal * max(bump.z, 0.2));
-#endif
   float angle = noise(gl_FragCoord.xy + jitter) * 6.2831853;
   vec2 turn = vec2(cos(angle), sin(angle));
   vec4 raised = vec4(position + flat_normal * 0.012, 1.0);
@@ -118,6 +71,5 @@ void main() {
   float rim = 1.0 - max(dot(n, to_camera), 0.0);
   rim *= rim;
   rim *= rim;
-  vec3 sum = albedo * (diffuse + ambient) + shine * 0.9 + ambient * rim * 0.10 * gloss + emission;
-  colour = vec4(clamp(sum, vec3(0.0), vec3(60.0)), 1.0);
+  return albedo * (diffuse + ambient) + shine * 0.9 + ambient * rim * 0.10 * gloss;
 }
