@@ -184,7 +184,7 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
 
         def hear(answer: Answer) -> None:
             answers.append(answer)
-            _refuse_to_go_on(answers)
+            refuse_to_go_on(answers)
             said = f"{len(answers)} of {len(left)}: {names[answer.trial]}: {in_words(answer)}"
             # Clips that were there already, or failed, have frames that nobody counted.
             progress.update(task, description=escape(said), advance=left[answer.trial])
@@ -204,7 +204,7 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
     return False
 
 
-def _refuse_to_go_on(answers: list[Answer]) -> None:
+def refuse_to_go_on(answers: list[Answer]) -> None:
     """Where nothing works at first, nothing will. Raises CommandError with the reason."""
     if len(answers) == FAILURES_AT_FIRST and all(answer.failure is not None for answer in answers):
         raise CommandError(f"none of the first {FAILURES_AT_FIRST} clips could be tried: {answers[-1].failure}")

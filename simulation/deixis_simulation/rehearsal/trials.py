@@ -109,13 +109,25 @@ def _action(dice: Dice, ground: Ground, place: Place, aim: Aim | None, heading_d
 
 
 def draw_site_room(dice: Dice, ground: Ground) -> Room:
-    """A room around all that stands in the site, whose look is not known; the site's own walls are drawn within it."""
+    """A room around all that stands in the site, with the site's own walls within it.
+
+    Painted light: a site file does not say how its walls look, and what skin-like ones do is no matter of its layout.
+    """
     reach: list[Point] = [(0.0, 0.0), ground.camera_foot, (ground.camera_foot[0] + LEAST_FRONT_M, 0.0)]
     reach += [poi.on_floor for poi in ground.pois] + [_bounded(end) for wall in ground.walls for end in wall]
     room = draw_room(dice, reach)
     highest = max(poi.position_m[2] for poi in ground.pois) + 0.5
     ceiling = min(max(room.ceiling_m, highest), HIGHEST_CEILING_M)
-    return room.model_copy(update={"walls": _drawn_walls(ground.walls), "ceiling_m": ceiling})
+    light = dice.whole(150, 225)
+    paint = light, light - dice.whole(0, 8), light - dice.whole(0, 16)
+    changes = {
+        "walls": _drawn_walls(ground.walls),
+        "ceiling_m": ceiling,
+        "wall": "plaster",
+        "wall_tone": paint,
+        "side_tone": paint,
+    }
+    return room.model_copy(update=changes)
 
 
 def _drawn_walls(walls: Sequence[Wall]) -> list[Wall]:
