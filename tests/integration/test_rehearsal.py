@@ -12,7 +12,7 @@ from deixis_runtime.host import chosen_stages
 from deixis_runtime.site import load_site
 from deixis_simulation.rehearsal.aims import aims_of
 from deixis_simulation.rehearsal.ground import ground_of
-from deixis_simulation.rehearsal.performance import Stage, play_trial
+from deixis_simulation.rehearsal.performance import Venue, play_trial
 from deixis_simulation.rehearsal.places import given_places
 from deixis_simulation.rehearsal.trials import plan_trials
 from running import POINTED_AT, ROOT, SITE
@@ -20,7 +20,7 @@ from running import POINTED_AT, ROOT, SITE
 DEIXIS = Path(sys.executable).parent / "deixis"
 ROOM = {
     "name": "a tiny room",
-    "camera": {"source": "0", "rate_hz": 15, "loop": True, "horizontal_fov_deg": 70},
+    "camera": {"source": "0", "rate_hz": 15, "loop": True, "horizontal_fov_deg": 70, "width": 320, "height": 240},
     "pois": [{"poi_id": "lamp", "name": "the lamp", "position_m": [1.6, 1.8, 1.2]}],
 }
 
@@ -48,7 +48,7 @@ def test_a_clip_is_answered_with_the_sites_own_pois(tmp_path: Path) -> None:
     asked = next(trial for trial in trials if trial.aim is not None and trial.aim.poi.poi_id == POINTED_AT)
     for suffix in (".mp4", ".json"):
         shutil.copy(ROOT / "examples" / "clips" / f"pointing{suffix}", tmp_path / f"{asked.scene.name}{suffix}")
-    answer = play_trial(asked, Stage(SITE, ground, aims, tmp_path, chosen_stages((), ())))
+    answer = play_trial(asked, Venue(SITE, ground, aims, tmp_path, chosen_stages((), ())))
     assert (answer.asked, answer.poi_ids, answer.outcome, answer.failure) == (POINTED_AT, (POINTED_AT,), "named", None)
 
 

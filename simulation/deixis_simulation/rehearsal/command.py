@@ -32,7 +32,7 @@ from .answers import Answer
 from .confusion import Confusion, confusion_of
 from .floor_map import draw_map
 from .ground import Ground, Point, RehearsalError, ground_of
-from .performance import Stage, perform
+from .performance import Venue, perform
 from .places import MOST_PLACES, Place, chosen_places, given_places
 from .report import plan_table, print_advice, print_report, report
 from .trials import Trial, plan_trials
@@ -151,12 +151,12 @@ def _tell_plan(console: Console, given: argparse.Namespace, plan: Plan, out: Pat
 
 def _rehearse(console: Console, given: argparse.Namespace, plan: Plan, out: Path) -> int:
     os.environ.setdefault("DEIXIS_LOG", "WARNING")
-    stage = Stage(
+    venue = Venue(
         given.site.resolve(), plan.ground, plan.aims, out / "clips", chosen_stages((), ()), stage_settings(given.sets)
     )
     began_s = time.monotonic()
     answers: list[Answer] = []
-    stopped = _perform(given, plan, stage, answers)
+    stopped = _perform(given, plan, venue, answers)
     if not answers:
         print("deixis rehearse: stopped before anything was answered", file=sys.stderr)
         return STOPPED
@@ -170,7 +170,7 @@ def _rehearse(console: Console, given: argparse.Namespace, plan: Plan, out: Path
     return _status(confusion, stopped, len(answers), len(plan.trials))
 
 
-def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[Answer]) -> bool:
+def _perform(given: argparse.Namespace, plan: Plan, venue: Venue, answers: list[Answer]) -> bool:
     """Fill `answers`; whether it was stopped before the end."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     names = {trial.scene.name: trial.words for trial in plan.trials}
@@ -196,11 +196,11 @@ def _perform(given: argparse.Namespace, plan: Plan, stage: Stage, answers: list[
             progress.advance(task)
 
         try:
-            perform(plan.trials, stage, given.jobs, hear, tick)
+            perform(plan.trials, venue, given.jobs, hear, tick)
         except (RenderingInterrupted, Interrupted, KeyboardInterrupt):
             return True
         except OSError as error:
-            raise CommandError(f"'{stage.clips}': {error.strerror or error}") from None
+            raise CommandError(f"'{venue.clips}': {error.strerror or error}") from None
     return False
 
 

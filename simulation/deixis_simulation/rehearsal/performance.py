@@ -25,7 +25,7 @@ from .trials import Trial
 
 
 @dataclass(frozen=True)
-class Stage:
+class Venue:
     """Where a rehearsal takes place: the site's own file, its clips' folder, and settings of the stages by stage."""
 
     site: Path
@@ -37,7 +37,7 @@ class Stage:
 
 
 def perform(
-    trials: Sequence[Trial], stage: Stage, jobs: int, hear: Callable[[Answer], None], tick: Callable[[Scene], None]
+    trials: Sequence[Trial], venue: Venue, jobs: int, hear: Callable[[Answer], None], tick: Callable[[Scene], None]
 ) -> None:
     """Tell `hear` the answer to each trial, in the order in which clips are ready; `tick` is called for each frame rendered.
 
@@ -49,29 +49,29 @@ def perform(
     # Played from here, between two messages of the renderers: these go on meanwhile, and one is not replaced until the clip
     # is over, so that the system has its processor.
     def play(scene: Scene) -> None:
-        hear(play_trial(of_scene[scene.name], stage))
+        hear(play_trial(of_scene[scene.name], venue))
 
     def fail(scene: Scene, why: str) -> None:
         hear(_unplayed(of_scene[scene.name], why))
 
     progress = Progress(frame=tick, ends=play, skips=play, fails=fail)
-    render_all([trial.scene for trial in trials], stage.clips, jobs=jobs, progress=progress)
+    render_all([trial.scene for trial in trials], venue.clips, jobs=jobs, progress=progress)
 
 
-def play_trial(trial: Trial, stage: Stage) -> Answer:
+def play_trial(trial: Trial, venue: Venue) -> Answer:
     """Play one clip to the system with the site's own file. What goes wrong stands in the answer. Raises Interrupted."""
     name = trial.scene.name
     try:
-        files = ClipFiles(stage.clips, name)
+        files = ClipFiles(venue.clips, name)
         clip = Clip(name, files.video, load_truth(files.truth))
     except ClipError as error:
         return _unplayed(trial, str(error))
     # A folder directly below the system's temporary one: each clip meets a registry that holds the site's POIs alone.
     with tempfile.TemporaryDirectory(prefix="deixis-rehearse-") as folder:
-        sets = settings_for(clip, stage.ground, Path(folder), stage.sets)
-        options = EvaluationOptions(stages=stage.stages, lockstep=True, sets=sets, site=stage.site)
+        sets = settings_for(clip, venue.ground, Path(folder), venue.sets)
+        options = EvaluationOptions(stages=venue.stages, lockstep=True, sets=sets, site=venue.site)
         score = evaluate_clip(clip, options)
-    own = [aim for aim in stage.aims if aim.place == trial.place]
+    own = [aim for aim in venue.aims if aim.place == trial.place]
     return answer_of(name, trial.place.letter, trial.aim, own, score, clip.truth)
 
 
