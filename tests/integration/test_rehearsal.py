@@ -27,7 +27,7 @@ ROOM = {
 
 def rehearse(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     command = [str(DEIXIS), "rehearse", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=170, check=False, cwd=cwd)
+    return subprocess.run(command, capture_output=True, text=True, timeout=280, check=False, cwd=cwd)
 
 
 def renderer_trouble() -> str | None:
@@ -74,7 +74,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, arguments: tuple[str, ...], w
     assert words in done.stderr
 
 
-@pytest.mark.timeout(200)
+@pytest.mark.timeout(300)
 def test_a_tiny_site_is_rehearsed(tmp_path: Path) -> None:
     trouble = renderer_trouble()
     if trouble is not None:
