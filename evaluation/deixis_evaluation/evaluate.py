@@ -37,7 +37,8 @@ class Interrupted(Exception):
 class EvaluationOptions:
     """How clips are played. `stages` are those that run, `truth` those in whose place the truth speaks.
 
-    `out` is the folder that gets NAME.jsonl, `sets` are settings of stages.
+    `out` is the folder that gets NAME.jsonl, `sets` are settings of stages. `site`: a site file to play clips with, in place of
+    one made from the truth; `sets` then name source and registry.
     """
 
     stages: tuple[str, ...]
@@ -45,6 +46,7 @@ class EvaluationOptions:
     lockstep: bool = False
     out: Path | None = None
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    site: Path | None = None
 
 
 def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[], None] | None = None) -> ClipScore:
@@ -54,7 +56,7 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
     """
     # A folder directly below the system's temporary one: the POI registry is made anew for each clip.
     with tempfile.TemporaryDirectory(prefix="deixis-eval-") as folder:
-        site = write_site(clip, Path(folder))
+        site = options.site or write_site(clip, Path(folder))
         out = options.out or Path(folder)
         try:
             speakers = Speakers(speakers_for(clip, options.truth, lockstep=options.lockstep), ROBOT, lockstep=options.lockstep)
