@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
+from .shapes import Shape, joined
 from .skinning import Mesh
 from .surface import Surface
 
@@ -59,7 +60,36 @@ class _Drawn:
     maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
     uniforms: dict[str, Any]
     person: int
-    casts_shadow: bool
+
+
+@dataclass(frozen=True)
+class _PeopleTargets:
+    """Where people are drawn, for one size of the window around them.
+
+    sampled, cover: how much of a pixel they cover, several samples a pixel and their mean; body, made_of: what they are
+    made of; lit: with the light on it.
+    """
+
+    sampled: moderngl.Framebuffer
+    cover: moderngl.Framebuffer
+    body: moderngl.Framebuffer
+    made_of: tuple[moderngl.Texture, ...]
+    lit: moderngl.Framebuffer
+    labels: moderngl.Framebuffer
+
+    @classmethod
+    def of(cls, context: moderngl.Context, size: tuple[int, int]) -> _PeopleTargets:
+        """New ones."""
+        grey = context.renderbuffer(size, 1, samples=SAMPLES)
+        made_of = tuple(context.texture(size, 4, dtype=kind) for kind in ("f2", "f2", "f2", "f4"))
+        return cls(
+            sampled=context.framebuffer([grey], context.depth_renderbuffer(size, samples=SAMPLES)),
+            cover=context.framebuffer([context.texture(size, 1)]),
+            body=context.framebuffer(made_of, context.depth_renderbuffer(size)),
+            made_of=made_of,
+            lit=context.framebuffer([context.texture(size, 4, dtype="f2")]),
+            labels=context.framebuffer([context.texture(size, 4)], context.depth_renderbuffer(size)),
+        )
 
 
 class Renderer:
@@ -87,16 +117,11 @@ class Renderer:
         colour = context.renderbuffer(self._size, 4, samples=SAMPLES, dtype="f2")
         self._sampled = context.framebuffer([colour], context.depth_renderbuffer(self._size, samples=SAMPLES))
         self._resolved = context.framebuffer([context.texture(self._size, 4, dtype="f2")])
-        grey = context.renderbuffer(self._size, 1, samples=SAMPLES)
-        self._covering = context.framebuffer([grey], context.depth_renderbuffer(self._size, samples=SAMPLES))
-        self._covered = context.framebuffer([context.texture(self._size, 1)])
-        self._bodies = [context.texture(self._size, 4, dtype=kind) for kind in ("f2", "f2", "f2", "f4")]
-        self._body = context.framebuffer(self._bodies, context.depth_renderbuffer(self._size))
+        self._targets: dict[tuple[int, int], _PeopleTargets] = {}
         corners = context.buffer(_uniform([[-1, -1], [3, -1], [-1, 3]]))
         self._screen = context.vertex_array(self._programs["person"], [(corners, "2f", "in_place")])
         small = width // SHADE_SCALE, height // SHADE_SCALE
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
-        self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
         atlas = context.depth_texture((SHADOW_TILE_PX * TILES, SHADOW_TILE_PX * TILES))
         atlas.compare_func, atlas.filter = "<=", (moderngl.LINEAR, moderngl.LINEAR)
         atlas.repeat_x = atlas.repeat_y = False
@@ -106,6 +131,8 @@ class Renderer:
         context.enable(moderngl.DEPTH_TEST)
         context.depth_func = "<="
         self._room: list[_Drawn] = []
+        self._room_depth: list[moderngl.VertexArray] = []
+        self._room_shadow: list[moderngl.VertexArray] = []
         self._people: list[_Drawn] = []
         self._lighting: Lighting | None = None
         self._matrices: list[Floats] = []
@@ -129,7 +156,10 @@ class Renderer:
             }
             look = self._white if surface.texture is None else self._texture(surface.texture)
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
-            self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
+            self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0))
+        # Where only its depth counts, the room is one shape: a call for each of its hundred parts takes longer than they do.
+        self._room_depth += self._depth_of([surface.shape for surface in surfaces])
+        self._room_shadow += self._depth_of([surface.shape for surface in surfaces if surface.casts_shadow])
 
     def add_person(self, look: Avatar, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
@@ -141,7 +171,7 @@ class Renderer:
         }
         empty = np.zeros((len(look.part), 3))
         mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
-        self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1, True))
+        self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1))
 
     def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
@@ -156,13 +186,13 @@ class Renderer:
         self._shadows.clear(depth=1.0)
         program = self._programs["depth"]
         self._matrices = [_lamp_matrix(lamp.position, centre) for lamp in lighting.lamps]
-        casting = [drawn for drawn in (*self._room, *(self._people if people else ())) if drawn.casts_shadow]
+        casting = [*self._room_shadow, *(drawn.depth for drawn in self._people if people)]
         for number, matrix in enumerate(self._matrices):
             column, row = number % TILES, number // TILES
             self._context.viewport = (column * SHADOW_TILE_PX, row * SHADOW_TILE_PX, SHADOW_TILE_PX, SHADOW_TILE_PX)
             program["view_projection"].write(_uniform(matrix.T))
-            for drawn in casting:
-                drawn.depth.render()
+            for shape in casting:
+                shape.render()
 
     # --- pictures -----------------------------------------------------------------------------------------------------
 
@@ -179,34 +209,39 @@ class Renderer:
         return mean
 
     def people(self, view: View, jitter: int = 0) -> FloatPicture:
-        """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them."""
+        """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them.
+
+        The view may be a window of the picture: the time is that of its pixels.
+        """
         matrix = _view_projection(view)
-        cover = self._cover(matrix)
-        self._draw_bodies(matrix, view)
-        self._resolved.use()
+        targets = self._people_targets(view)
+        cover = self._cover(matrix, targets)
+        self._draw_bodies(matrix, view, targets)
+        targets.lit.use()
         self._context.disable(moderngl.DEPTH_TEST)
         self._set_light(self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)])
         names = "albedo_map", "normal_map", "flat_map", "position_map"
-        for unit, (name, content) in enumerate(zip(names, self._bodies, strict=True)):
+        for unit, (name, content) in enumerate(zip(names, targets.made_of, strict=True)):
             content.use(unit + 4)
             self._programs["person"][name] = unit + 4
         self._screen.render()
         self._context.enable(moderngl.DEPTH_TEST)
-        return _edged(self._read(self._resolved), cover)
+        return _edged(self._read(targets.lit), cover)
 
     def labels(self, view: View) -> NDArray[np.uint8]:
         """Per pixel person << 5 | skin << 4 | part (h, w); 0 where there is nobody."""
-        self._labels.use()
-        self._context.viewport = (0, 0, *self._size)
-        self._labels.clear(0.0, 0.0, 0.0, 0.0)
+        target, matrix = self._people_targets(view).labels, _view_projection(view)
+        target.use()
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        self._hide_behind_room(matrix)
         program = self._programs["label"]
-        program["view_projection"].write(_uniform(_view_projection(view).T))
+        program["view_projection"].write(_uniform(matrix.T))
         program["skin_mask"] = 2
-        for drawn in (*self._room, *self._people):
+        for drawn in self._people:
             drawn.maps[2].use(2)
             program["person"] = float(drawn.person)
             drawn.label.render()
-        raw = _bytes_of(self._labels, 4)
+        raw = _bytes_of(target, 4)
         part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
         packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
         return np.where(person > 0, packed, 0).astype(np.uint8)
@@ -224,21 +259,27 @@ class Renderer:
             item.seen.render()
         return self._read(target)
 
-    def _cover(self, matrix: Floats) -> FloatPicture:
+    def _people_targets(self, view: View) -> _PeopleTargets:
+        size = view.width, view.height
+        if size not in self._targets:
+            self._targets[size] = _PeopleTargets.of(self._context, size)
+        self._context.viewport = (0, 0, *size)
+        return self._targets[size]
+
+    def _cover(self, matrix: Floats, targets: _PeopleTargets) -> FloatPicture:
         """Share of each pixel (h, w, 1) that people cover."""
-        self._covering.use()
-        self._context.viewport = (0, 0, *self._size)
-        self._covering.clear(0.0, 0.0, 0.0, 0.0)
+        targets.sampled.use()
+        targets.sampled.clear(0.0, 0.0, 0.0, 0.0)
         self._hide_behind_room(matrix)
         self._programs["cover"]["view_projection"].write(_uniform(matrix.T))
         for item in self._people:
             item.cover.render()
-        self._context.copy_framebuffer(self._covered, self._covering)
-        return _bytes_of(self._covered, 1).astype(np.float32) / np.float32(255)
+        self._context.copy_framebuffer(targets.cover, targets.sampled)
+        return _bytes_of(targets.cover, 1).astype(np.float32) / np.float32(255)
 
-    def _draw_bodies(self, matrix: Floats, view: View) -> None:
-        self._body.use()
-        self._body.clear(0.0, 0.0, 0.0, 0.0)
+    def _draw_bodies(self, matrix: Floats, view: View, targets: _PeopleTargets) -> None:
+        targets.body.use()
+        targets.body.clear(0.0, 0.0, 0.0, 0.0)
         self._hide_behind_room(matrix)
         program = self._programs["body"]
         program["view_projection"].write(_uniform(matrix.T))
@@ -249,8 +290,17 @@ class Renderer:
 
     def _hide_behind_room(self, matrix: Floats) -> None:
         self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
-        for item in self._room:
-            item.depth.render()
+        for shape in self._room_depth:
+            shape.render()
+
+    def _depth_of(self, shapes: Sequence[Shape]) -> list[moderngl.VertexArray]:
+        """The shapes as one, for their depth alone; none where there are none."""
+        if not shapes:
+            return []
+        whole = joined(shapes)
+        at = self._context.buffer(_uniform(whole.vertices))
+        index = self._context.buffer(np.ascontiguousarray(whole.triangles, np.int32).tobytes())
+        return [self._context.vertex_array(self._programs["depth"], [(at, "3f", "in_position")], index)]
 
     def _set_look(self, program: Any, item: _Drawn) -> None:
         for unit, (name, look) in enumerate(zip(("albedo_map", "normal_map", "skin_mask"), item.maps, strict=True)):
@@ -299,7 +349,6 @@ class Renderer:
         maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture],
         uniforms: dict[str, Any],
         person: int,
-        casts_shadow: bool,
     ) -> _Drawn:
         positions, normals, coordinates, part, triangles = mesh
         buffer = self._context.buffer
@@ -315,7 +364,7 @@ class Renderer:
 
         places = [(at, "3f", "in_position")]
         depth, cover = array("depth", places), array("cover", places)
-        return _Drawn(at, up, array(kind, whole), depth, cover, array("label", whole), maps, uniforms, person, casts_shadow)
+        return _Drawn(at, up, array(kind, whole), depth, cover, array("label", whole), maps, uniforms, person)
 
     def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
         content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])

@@ -22,11 +22,30 @@ SHADOWS_STAND_M = 0.004
 SUBFRAMES = ((1.0, 1), (3.0, 2), (12.0, 4))
 """Motion blur: up to so many pixels of motion within the exposure, so many pictures are averaged; MOST beyond."""
 MOST_SUBFRAMES = 6
+NEAREST_M = 0.1
+EDGE_PX, STEP_PX = 3, 32
+"""Margin around people, and the grain of the window that is rendered around them."""
 
 
 def subframes_for(motion_px: float) -> int:
     """How many pictures make the motion blur of a frame in which something moves so far while the shutter is open."""
     return next((count for limit, count in SUBFRAMES if motion_px < limit), MOST_SUBFRAMES)
+
+
+def window_of(meshes: Sequence[Mesh], view: View) -> tuple[int, int, int, int] | None:
+    """Left, top, width, height (pixels) of the part of the picture that people are in; none where they are not in it."""
+    if not meshes:
+        return None
+    points = view.in_camera(np.vstack([mesh.vertices for mesh in meshes]))
+    seen = points[points[:, 2] > NEAREST_M] @ view.matrix.T
+    if len(seen) < len(points):
+        return 0, 0, view.width, view.height
+    places = seen[:, :2] / seen[:, 2:]
+    # Whole steps: a renderer keeps its memory by size, and there should not be hundreds of sizes.
+    low = np.maximum(np.floor((places.min(0) - EDGE_PX) / STEP_PX) * STEP_PX, 0).astype(int)
+    high = np.minimum(np.ceil((places.max(0) + EDGE_PX) / STEP_PX) * STEP_PX, (view.width, view.height)).astype(int)
+    width, height = high - low
+    return (int(low[0]), int(low[1]), int(width), int(height)) if width > 0 and height > 0 else None
 
 
 class Stage:
@@ -43,6 +62,7 @@ class Stage:
         self._view: View | None = None
         self._room: FloatPicture
         self._plain: FloatPicture
+        self._shaded: FloatPicture
         self._shadowed: list[NDArray[np.float32]] = []
 
     def close(self) -> None:
@@ -56,21 +76,30 @@ class Stage:
         self._look_at(view, centre)
         if not self._scene.people:
             return self._room.copy()
-        self._cast_shadows(middle, centre)
-        people: FloatPicture | None = None
+        self._cast_shadows(view, middle, centre)
+        picture = self._shaded.copy()
+        window = window_of([mesh for meshes in subframes for mesh in meshes], view)
+        if window is None:
+            return picture
+        part = view.part(*window)
+        people = np.zeros((part.height, part.width, 4), np.float32)
         for number, meshes in enumerate(subframes):
             self._renderer.pose(meshes)
-            one = self._renderer.people(view, number)
-            people = one if people is None else people + one
-        assert people is not None
-        room = shadows_on(self._room, self._plain, self._renderer.shade(view))
-        return over(people / np.float32(len(subframes)), room)
+            people += self._renderer.people(part, number)
+        left, top, width, height = window
+        inside = picture[top : top + height, left : left + width]
+        inside[:] = over(people / np.float32(len(subframes)), inside)
+        return picture
 
     def labels(self, view: View, meshes: Sequence[Mesh]) -> NDArray[np.uint8]:
         """Label picture (h, w), see Renderer.labels."""
-        if meshes:
+        labels = np.zeros((view.height, view.width), np.uint8)
+        window = window_of(meshes, view)
+        if window is not None:
             self._renderer.pose(meshes)
-        return self._renderer.labels(view)
+            left, top, width, height = window
+            labels[top : top + height, left : left + width] = self._renderer.labels(view.part(*window))
+        return labels
 
     def _centre(self, meshes: Sequence[Mesh]) -> Floats:
         if not meshes:
@@ -87,7 +116,7 @@ class Stage:
         self._view = view
         self._renderer.light(lighting(self._scene.light, self._lamps_around()), centre, people=False)
         self._room = self._renderer.room(view, 1 if self._moves else 6)
-        self._plain = self._renderer.shade(view)
+        self._plain, self._shaded = self._renderer.shade(view), self._room
         self._shadowed = []
 
     def _lamps_around(self) -> Floats:
@@ -98,7 +127,7 @@ class Stage:
         x, y = places.mean(axis=0)
         return np.array((-y, 0.0, -x))
 
-    def _cast_shadows(self, meshes: Sequence[Mesh], centre: Floats) -> None:
+    def _cast_shadows(self, view: View, meshes: Sequence[Mesh], centre: Floats) -> None:
         now = [mesh.vertices[::97] for mesh in meshes]
         if self._shadowed and all(
             float(np.abs(a - b).max()) < SHADOWS_STAND_M for a, b in zip(now, self._shadowed, strict=True)
@@ -107,3 +136,4 @@ class Stage:
         self._shadowed = [np.array(vertices) for vertices in now]
         self._renderer.pose(meshes)
         self._renderer.light(lighting(self._scene.light, self._lamps_around()), centre)
+        self._shaded = shadows_on(self._room, self._plain, self._renderer.shade(view))
