@@ -18,7 +18,7 @@ from .idle import Idle
 from .rotations import UP, azimuth_deg, elevation_deg, heading_vector, unit
 from .scene import ArmSide, Pointing
 from .skeleton import Posture, Skeleton, solve
-from .trunk import Look, azimuth_of, enough_trunk_deg, usual_trunk_deg
+from .trunk import Look, azimuth_of, enough_trunk_deg, reachable_deg, usual_trunk_deg
 
 _HEAD_PITCH_SHARE = 0.55
 _HEAD_RELEASE_S = 0.12
@@ -66,8 +66,8 @@ def plan_pointing(
         middle = solve(body, posture).carried("Head", body.head_centre)
         way = target - middle
         azimuth = azimuth_of(way, outward(action.arm))
-        look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - middle), roll)
-        before, trunk = trunk, _trunk_deg(action, azimuth, look.head[0])
+        before, trunk = trunk, _trunk_deg(action, azimuth)
+        look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - middle), trunk, roll)
         posture.turn_trunk(trunk - before)
         posture.head = look.head
     return PointingPlan(action, trunk, pointing_arm(action, body, posture, target, reach), look)
@@ -141,19 +141,23 @@ def _on_ray(start: Floats, target: Floats, centre: Floats, radius: float) -> Flo
     return leaves
 
 
-def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, roll: float) -> Look:
-    if action.looks == "robot":
-        return Look((to_camera, 0.0, roll), (0.0, 0.0))
-    if action.looks == "elsewhere":
-        return Look((to_camera + action.elsewhere_deg, 0.0, roll), (0.0, 0.0))
-    head = azimuth * action.head_gain + float(np.sign(azimuth)) * action.head_overshoot_deg
+def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, trunk: float, roll: float) -> Look:
+    if action.looks != "poi":
+        aside = action.elsewhere_deg if action.looks == "elsewhere" else 0.0
+        return Look((reachable_deg(to_camera + aside, trunk), 0.0, roll), (0.0, 0.0))
+    head = reachable_deg(_head_deg(action, azimuth), trunk)
     pitch = elevation * _HEAD_PITCH_SHARE
     return Look((head, pitch, roll), (azimuth - head, elevation - pitch))
 
 
-def _trunk_deg(action: Pointing, azimuth: float, head: float) -> float:
-    """As people usually do, times the gain; but as much as arm and neck need."""
+def _head_deg(action: Pointing, azimuth: float) -> float:
+    return azimuth * action.head_gain + float(np.sign(azimuth)) * action.head_overshoot_deg
+
+
+def _trunk_deg(action: Pointing, azimuth: float) -> float:
+    """As people usually do, times the gain; but as much as the arm needs, and the neck if the head looks there."""
     wanted = usual_trunk_deg(azimuth) * action.torso_gain
     across, out = _ACROSS_DEG[action.style], _OUT_DEG[action.style]
     left, right = (out, across) if action.arm == "left" else (across, out)
-    return enough_trunk_deg(min(max(wanted, azimuth - left), azimuth + right), head)
+    enough = min(max(wanted, azimuth - left), azimuth + right)
+    return enough_trunk_deg(enough, _head_deg(action, azimuth) if action.looks == "poi" else enough)

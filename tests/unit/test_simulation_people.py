@@ -182,10 +182,10 @@ def test_a_straight_arm_points_at_the_poi(
     moment = acting([pointing(arm=arm, torso_gain=gain)], poi, heading_deg=heading).moment(2.2)
     target, tip = to_world(poi), moment.fingertip[arm]
     between = (moment.eyes + moment.shoulder[arm]) / 2
-    assert angle_deg(tip - between, target - between) < 5
-    assert angle_deg(tip - moment.eyes, target - moment.eyes) < 15
+    assert angle_deg(tip - between, target - between) < 3
+    assert angle_deg(tip - moment.eyes, target - moment.eyes) < 17
     finger = tip - moment.index_base[arm]
-    assert angle_deg(finger, target - moment.index_base[arm]) < 15
+    assert angle_deg(finger, target - moment.index_base[arm]) < 10
 
 
 @pytest.mark.parametrize("style", ["bent", "hip"])
@@ -217,6 +217,16 @@ def test_the_head_does_its_share_and_overshoots() -> None:
     assert yaw(looks="elsewhere", elsewhere_deg=-40) == pytest.approx(-40, abs=1)
 
 
+@pytest.mark.parametrize("looks", ["poi", "robot", "elsewhere"])
+@pytest.mark.parametrize("heading", [0, 90, 180, 270])
+@pytest.mark.parametrize("arm", ["left", "right"])
+def test_the_neck_never_turns_too_far(looks: str, heading: float, arm: ArmSide) -> None:
+    actor = acting([pointing(looks=looks, arm=arm, elsewhere_deg=100)], around(-120), heading_deg=heading)
+    for time in np.arange(-0.1, 4, 0.1):
+        skeleton = actor.moment(float(time)).skeleton
+        assert angle_deg(skeleton.rotation("Head")[:, 2], skeleton.rotation("Spine2")[:, 2]) < 90
+
+
 def test_the_head_comes_before_or_after_the_arm() -> None:
     early, late = (acting([pointing(head_lag_s=lag)]).moment(1.2) for lag in (-0.2, 0.3))
     turned = [abs(azimuth_deg(moment.head_rotation[:, 2])) for moment in (early, late)]
@@ -229,7 +239,7 @@ def test_two_pointings_in_a_row() -> None:
     assert [moment.poi for moment in (first, pause, second)] == ["a", None, "b"]
     assert [moment.arm_side for moment in (first, pause, second)] == ["left", None, "right"]
     target = to_world((2, -2, 1))
-    assert angle_deg(second.fingertip["right"] - second.eyes, target - second.eyes) < 15
+    assert angle_deg(second.fingertip["right"] - second.eyes, target - second.eyes) < 17
 
 
 # --- quiet gestures and looks -----------------------------------------------------------------------------------------
@@ -299,7 +309,7 @@ def test_pointing_after_a_walk_is_from_there() -> None:
     actor = acting([{"type": "walk", "start_s": 0.0, "to_m": (3.0, -1.0)}, pointing(start_s=5.0)], poi)
     moment = actor.moment(6.2)
     target = to_world(poi)
-    assert angle_deg(moment.fingertip["left"] - moment.eyes, target - moment.eyes) < 15
+    assert angle_deg(moment.fingertip["left"] - moment.eyes, target - moment.eyes) < 17
 
 
 def test_a_glance_at_the_robot_while_walking() -> None:
