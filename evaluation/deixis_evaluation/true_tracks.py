@@ -80,7 +80,7 @@ class TrueTracks:
             person_id=person.id,
             kind="face",
             kind_probabilities=KindProbabilities(face=1.0),
-            centroid_px=(x, y),
+            centroid_px=person.face.centroid_visible_px or (x, y),
             bbox_px=(x - (width - 1) / 2, y - (FACE_HEIGHT * width - 1) / 2, width, FACE_HEIGHT * width),
             velocity_px_s=(0.0, 0.0),
             frontal=frontal if person.face.visible_px >= MIN_FACE_PX else None,
@@ -116,11 +116,13 @@ class TrueTracks:
         )
 
     def _moving(self, track: Track) -> Track:
-        """The track with its velocity since the frame before."""
-        before = self._before.get(track.track_id, track.centroid_px)
-        self._before[track.track_id] = track.centroid_px
+        """The track with its velocity since the frame before: a head's is that of its box, for the skin moves as it turns."""
+        x, y, w, h = track.bbox_px
+        now = (x + (w - 1) / 2, y + (h - 1) / 2) if track.kind == "face" else track.centroid_px
+        before = self._before.get(track.track_id, now)
+        self._before[track.track_id] = now
         fps = self._truth.meta.fps
-        velocity = ((track.centroid_px[0] - before[0]) * fps, (track.centroid_px[1] - before[1]) * fps)
+        velocity = ((now[0] - before[0]) * fps, (now[1] - before[1]) * fps)
         return track.model_copy(update={"velocity_px_s": velocity})
 
 
