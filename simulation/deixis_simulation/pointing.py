@@ -92,18 +92,25 @@ def _straight_arm(action: Pointing, body: Body, posture: Posture, target: Floats
     shoulder, eyes = skeleton.position(f"{prefix}Arm"), skeleton.carried("Head", body.eyes)
     finger = float(np.linalg.norm(body.fingertip[side] - body.joint(f"{prefix}Hand")))
     length = (body.length(f"{prefix}Arm") + body.length(f"{prefix}ForeArm")) * reach + finger
-    tip = shoulder + length * unit(unit(_on_ray(eyes, target, shoulder, length) - shoulder) + unit(target - shoulder))
-    hand = unit(0.6 * unit(target - tip) + 0.4 * unit(tip - shoulder))
     elbow_toward = -UP + chest @ np.array([outward(side) * 0.55, 0.0, -0.25])
-    wrist = tip - hand * finger
+    missed = np.zeros(3)
     for _ in range(_ROUNDS):
+        # The clavicle brings the shoulder forward, the finger is no straight continuation of the hand: once more from there.
+        tip = _tip(shoulder, eyes, target, length)
+        hand = unit(0.6 * unit(target - tip) + 0.4 * unit(tip - shoulder))
+        wrist = tip - hand * finger + missed
         arm = arm_to_wrist(body, side, chest, shoulder, wrist, elbow_toward, hand, shape, pronation_deg=action.pronation_deg)
-        # The clavicle moves the shoulder, the finger is no straight continuation of the hand: correct by what is missing.
         posture.arms[side] = arm
         skeleton = solve(body, posture)
         shoulder = skeleton.position(f"{prefix}Arm")
-        wrist = wrist + (tip - fingertip(skeleton, side))
+        missed = missed + _tip(shoulder, eyes, target, length) - fingertip(skeleton, side)
     return arm
+
+
+def _tip(shoulder: Floats, eyes: Floats, target: Floats, length: float) -> Floats:
+    """Half-way between the lines from eyes and shoulder to the target, as far from the shoulder as the arm is long."""
+    on_sight = unit(_on_ray(eyes, target, shoulder, length) - shoulder)
+    return shoulder + length * unit(on_sight + unit(target - shoulder))
 
 
 def _bent_arm(action: Pointing, body: Body, posture: Posture, target: Floats) -> Arm:

@@ -330,3 +330,10 @@ def test_who_points_without_looking_looks_down_at_a_low_robot() -> None:
     scene = Scene(duration_s=5, camera=camera, pois=[ScenePoi(poi_id="a", position_m=(2.0, 2.0, 1.2))], people=[body])
     moment = Actor(body, scene, 0).moment(2.2)
     assert moment.head_rotation[1, 2] < -0.25
+
+
+@pytest.mark.parametrize("azimuth", [-20, 30, 75, 115])
+def test_a_straight_arm_is_nearly_stretched(azimuth: float) -> None:
+    moment = acting([pointing()], around(azimuth)).moment(2.2)
+    upper, fore = moment.elbow["left"] - moment.shoulder["left"], moment.wrist["left"] - moment.elbow["left"]
+    assert angle_deg(upper, fore) < 40
