@@ -67,7 +67,7 @@ def plan_pointing(
         way = target - middle
         azimuth = azimuth_of(way, outward(action.arm))
         before, trunk = trunk, _trunk_deg(action, azimuth)
-        look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - middle), trunk, roll)
+        look = _look(action, azimuth, elevation_deg(way), camera - middle, trunk, roll)
         posture.turn_trunk(trunk - before)
         posture.head = look.head
     return PointingPlan(action, trunk, pointing_arm(action, body, posture, target, reach), look)
@@ -141,10 +141,13 @@ def _on_ray(start: Floats, target: Floats, centre: Floats, radius: float) -> Flo
     return leaves
 
 
-def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, trunk: float, roll: float) -> Look:
+def _look(action: Pointing, azimuth: float, elevation: float, to_camera: Floats, trunk: float, roll: float) -> Look:
     if action.looks != "poi":
         aside = action.elsewhere_deg if action.looks == "elsewhere" else 0.0
-        return Look((reachable_deg(to_camera + aside, trunk), 0.0, roll), (0.0, 0.0))
+        # People look up or down at a robot; elsewhere there is nothing to look at.
+        up = elevation_deg(to_camera) if action.looks == "robot" else 0.0
+        pitch = up * _HEAD_PITCH_SHARE
+        return Look((reachable_deg(azimuth_deg(to_camera) + aside, trunk), pitch, roll), (0.0, up - pitch))
     head = reachable_deg(_head_deg(action, azimuth), trunk)
     pitch = elevation * _HEAD_PITCH_SHARE
     return Look((head, pitch, roll), (azimuth - head, elevation - pitch))

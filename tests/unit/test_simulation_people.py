@@ -12,7 +12,7 @@ from deixis_simulation.avatars import AVATARS, FITTING_AVATARS, HELD_OUT_AVATARS
 from deixis_simulation.body import fit_body, head_factor
 from deixis_simulation.geometry import Floats, to_world, wrap_deg
 from deixis_simulation.rotations import azimuth_deg
-from deixis_simulation.scene import QUIET_GESTURES, ArmSide, Person, QuietGesture, Scene, ScenePoi
+from deixis_simulation.scene import QUIET_GESTURES, ArmSide, Camera, Person, QuietGesture, Scene, ScenePoi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -320,3 +320,13 @@ def test_a_glance_at_the_robot_while_walking() -> None:
     toward = azimuth_deg(CAMERA - glancing.head_centre)
     assert abs(wrap_deg(azimuth_deg(glancing.head_rotation[:, 2]) - toward)) < 10
     assert abs(wrap_deg(azimuth_deg(plain.head_rotation[:, 2]) - toward)) > 30
+
+
+def test_who_points_without_looking_looks_down_at_a_low_robot() -> None:
+    body = Person.model_validate(
+        {"avatar": "White_M_3_Casual", "place_m": (1.2, 0.0), "height_m": 1.9, "actions": [pointing(looks="robot")]}
+    )
+    camera = Camera(position_m=(0.0, 0.0, 0.8))
+    scene = Scene(duration_s=5, camera=camera, pois=[ScenePoi(poi_id="a", position_m=(2.0, 2.0, 1.2))], people=[body])
+    moment = Actor(body, scene, 0).moment(2.2)
+    assert moment.head_rotation[1, 2] < -0.25
