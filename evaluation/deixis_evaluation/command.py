@@ -109,7 +109,7 @@ def _tell(conditions: Conditions, json_file: Path | None, scores: Sequence[ClipS
         console.width = TABLE_WIDTH
     print_scores(console, scores, summary, slices)
     if conditions.truth:
-        console.print(say_truth(conditions.truth, summary), markup=False, highlight=False)
+        console.print(say_truth(conditions.truth, summary), markup=False, highlight=False, soft_wrap=True)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     if json_file is not None:
         content = report(conditions, scores, summary, slices, machine)
