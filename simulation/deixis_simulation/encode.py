@@ -22,10 +22,13 @@ class Encoder:
         """`crf`: x264's rate factor, more is coarser. Raises EncodeError."""
         self._path = path
         try:
+            path.open("wb").close()  # FFmpeg opens it with the first frame only
             # Faststart: a player that streams the file has the index first.
             self._file = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
             # One thread: the bytes must not depend on the number of cores.
-            self._stream = self._file.add_stream("libx264", rate=fps, options={"crf": f"{crf:g}", "preset": "medium", "threads": "1"})
+            self._stream = self._file.add_stream(
+                "libx264", rate=fps, options={"crf": f"{crf:g}", "preset": "medium", "threads": "1"}
+            )
         except (OSError, ValueError) as error:
             raise EncodeError(f"film '{path}' cannot be written: {error}") from None
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, "yuv420p"

@@ -25,7 +25,8 @@ WORLD_OF_MAP: Floats = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 
 
 def to_world(position_m: Sequence[float]) -> Floats:
     """A map position, 2 (on the floor) or 3 numbers, in the world."""
-    return WORLD_OF_MAP @ np.array([*position_m, 0.0][:3], float)
+    world: Floats = WORLD_OF_MAP @ np.array([*position_m, 0.0][:3], float)
+    return world
 
 
 def to_map(world: Floats) -> Floats:
@@ -96,16 +97,15 @@ class View:
     def project(self, points: Floats) -> Floats:
         """World points (..., 3) to pixels (..., 2); meaningless behind the camera."""
         seen = self.in_camera(points) @ self.matrix.T
-        return seen[..., :2] / seen[..., 2:]
+        pixels: Floats = seen[..., :2] / seen[..., 2:]
+        return pixels
 
 
 def view_at(camera: Camera, robot: RobotState) -> View:
     """What the camera sees when the robot is there."""
     yaw = math.radians(robot.yaw_deg)
     x, y, z = camera.position_m
-    centre = np.array(
-        [robot.x_m + math.cos(yaw) * x - math.sin(yaw) * y, robot.y_m + math.sin(yaw) * x + math.cos(yaw) * y, z]
-    )
+    centre = np.array([robot.x_m + math.cos(yaw) * x - math.sin(yaw) * y, robot.y_m + math.sin(yaw) * x + math.cos(yaw) * y, z])
     # base_link -> camera body (x ahead, y left, z up): yaw to the left, pitch up, then roll clockwise seen from behind.
     body = Rotation.from_euler("ZYX", [robot.yaw_deg + camera.yaw_deg, -camera.pitch_up_deg, camera.roll_deg], degrees=True)
     optical_of_body = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

@@ -41,7 +41,7 @@ class Lighting:
     ambient_down: Floats
 
 
-def lighting(light: Light, centre: Sequence[float]) -> Lighting:
+def lighting(light: Light, centre: Sequence[float] | Floats) -> Lighting:
     """The lamps of a preset around `centre` (world; where people stand)."""
     made = _PRESETS[light.preset](float(centre[0]), float(centre[2]))
     tint = np.array(light.tint)
@@ -95,9 +95,7 @@ def _office(x: float, z: float) -> Lighting:
 
 
 def _window(x: float, z: float, side: int) -> Lighting:
-    keys = [
-        _lamp((x + 2.9 * side, y, z + dz), (0.92, 1.0, 1.12), 0.9, 0.03, 8.0) for y in (1.2, 1.9) for dz in (0.8, 2.2)
-    ]
+    keys = [_lamp((x + 2.9 * side, y, z + dz), (0.92, 1.0, 1.12), 0.9, 0.03, 8.0) for y in (1.2, 1.9) for dz in (0.8, 2.2)]
     keys.append(_lamp((x, 2.7, z + 1.0), (1.0, 0.86, 0.66), 0.35, 0.05, 3.0))
     return _of(keys + _fills(x, z, (1, 0.97, 0.94), 0.55), (0.13, 0.13, 0.14), (0.10, 0.09, 0.08))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
-from .room import Surface
+from .surface import Surface
 
 FloatPicture = NDArray[np.float32]
 
@@ -85,13 +85,14 @@ class Renderer:
         """Raises RenderError where there is no OpenGL over EGL."""
         self._size = width, height
         try:
-            self._context = moderngl.create_context(standalone=True, backend="egl")
+            self._context = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[arg-type]
         except Exception as error:  # moderngl raises bare Exception, whatever the cause is
             raise RenderError(
                 f"no OpenGL over EGL here ({error}); on Debian: apt-get install libegl1 libgl1-mesa-dri"
             ) from None
         context = self._context
-        self._programs = {
+        # Any: moderngl's types do not tell a uniform from a varying.
+        self._programs: dict[str, Any] = {
             "room": self._program("surface.vert", "room.frag"),
             "body": self._program("surface.vert", "body.frag"),
             "person": self._program("screen.vert", "person.frag"),
@@ -113,7 +114,8 @@ class Renderer:
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
         self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
         atlas = context.depth_texture((SHADOW_TILE_PX * TILES, SHADOW_TILE_PX * TILES))
-        atlas.compare_func, atlas.filter, atlas.repeat_x, atlas.repeat_y = "<=", (moderngl.LINEAR, moderngl.LINEAR), False, False
+        atlas.compare_func, atlas.filter = "<=", (moderngl.LINEAR, moderngl.LINEAR)
+        atlas.repeat_x = atlas.repeat_y = False
         self._atlas, self._shadows = atlas, context.framebuffer(depth_attachment=atlas)
         self._white = self._texture(np.full((4, 4, 3), 255, np.uint8))
         self._flat = self._texture(np.full((4, 4, 3), (128, 128, 255), np.uint8))
@@ -143,9 +145,7 @@ class Renderer:
             }
             look = self._white if surface.texture is None else self._texture(surface.texture)
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
-            self._room.append(
-                self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow)
-            )
+            self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
 
     def add_person(self, look: Look, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
@@ -185,12 +185,14 @@ class Renderer:
     def room(self, view: View, passes: int = ROOM_PASSES) -> FloatPicture:
         """The room without people (h, w, 3), linear; light() decides whose shadows fall into it."""
         pictures = [self._pass(view, self._room, self._sampled, jitter)[..., :3] for jitter in self._jitters[:passes]]
-        return np.mean(pictures, axis=0, dtype=np.float32)
+        mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
+        return mean
 
     def shade(self, view: View) -> FloatPicture:
-        """The room without people at a quarter of the size: two of them, with and without people's shadows, give the shadows."""
+        """The room at a quarter of the size, without people; one with and one without their shadows give the shadows."""
         pictures = [self._pass(view, self._room, self._small, jitter)[..., :3] for jitter in self._jitters[:2]]
-        return np.mean(pictures, axis=0, dtype=np.float32)
+        mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
+        return mean
 
     def people(self, view: View, jitter: int = 0) -> FloatPicture:
         """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them."""
@@ -200,7 +202,8 @@ class Renderer:
         self._resolved.use()
         self._context.disable(moderngl.DEPTH_TEST)
         self._set_light(self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)])
-        for unit, (name, content) in enumerate(zip(("albedo_map", "normal_map", "flat_map", "position_map"), self._bodies, strict=True)):
+        names = "albedo_map", "normal_map", "flat_map", "position_map"
+        for unit, (name, content) in enumerate(zip(names, self._bodies, strict=True)):
             content.use(unit + 4)
             self._programs["person"][name] = unit + 4
         self._screen.render()
@@ -219,8 +222,7 @@ class Renderer:
             drawn.maps[2].use(2)
             program["person"] = float(drawn.person)
             drawn.label.render()
-        width, height = self._size
-        raw = np.frombuffer(self._labels.color_attachments[0].read(), np.uint8).reshape(height, width, 4)[::-1]
+        raw = _bytes_of(self._labels, 4)
         part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
         packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
         return np.where(person > 0, packed, 0).astype(np.uint8)
@@ -248,9 +250,7 @@ class Renderer:
         for item in self._people:
             item.cover.render()
         self._context.copy_framebuffer(self._covered, self._covering)
-        width, height = self._size
-        raw = np.frombuffer(self._covered.color_attachments[0].read(alignment=1), np.uint8).reshape(height, width, 1)[::-1]
-        return raw.astype(np.float32) / np.float32(255)
+        return _bytes_of(self._covered, 1).astype(np.float32) / np.float32(255)
 
     def _draw_bodies(self, matrix: Floats, view: View) -> None:
         self._body.use()
@@ -268,7 +268,7 @@ class Renderer:
         for item in self._room:
             item.depth.render()
 
-    def _set_look(self, program: moderngl.Program, item: _Drawn) -> None:
+    def _set_look(self, program: Any, item: _Drawn) -> None:
         for unit, (name, look) in enumerate(zip(("albedo_map", "normal_map", "skin_mask"), item.maps, strict=True)):
             look.use(unit)
             if name in program:
@@ -282,10 +282,10 @@ class Renderer:
             self._context.copy_framebuffer(self._resolved, self._sampled)
             target = self._resolved
         width, height = target.size
-        raw = np.frombuffer(target.color_attachments[0].read(), np.float16).reshape(height, width, 4)[::-1]
+        raw = np.frombuffer(target.read(components=4, dtype="f2"), np.float16).reshape(height, width, 4)[::-1]
         return np.clip(np.nan_to_num(raw.astype(np.float32), posinf=BRIGHTEST), 0, BRIGHTEST)
 
-    def _set_light(self, program: moderngl.Program, matrix: Floats, view: View, jitter: Floats) -> None:
+    def _set_light(self, program: Any, matrix: Floats, view: View, jitter: Floats) -> None:
         assert self._lighting is not None, "light() comes before any picture"
         lamps = self._lighting.lamps
         padded = MAX_LAMPS - len(lamps)
@@ -350,6 +350,12 @@ def _source(name: str) -> str:
     folder = files(__package__) / "shaders"
     lines = (folder / name).read_text(encoding="utf-8").splitlines()
     return "\n".join(_source(line.split()[1]) if line.startswith("#include ") else line for line in lines) + "\n"
+
+
+def _bytes_of(target: moderngl.Framebuffer, components: int) -> NDArray[np.uint8]:
+    width, height = target.size
+    content = target.read(components=components, alignment=1)
+    return np.frombuffer(content, np.uint8).reshape(height, width, components)[::-1]
 
 
 def _edged(light: FloatPicture, cover: FloatPicture) -> FloatPicture:

@@ -76,7 +76,9 @@ class Pointing(Part):
     hand: HandShape = "index"
     looks: Literal["poi", "robot", "elsewhere"] = Field(default="poi", description="Where the head turns to.")
     elsewhere_deg: Degree = Field(default=0.0, description="Azimuth of the head where it looks elsewhere.")
-    head_gain: float = Field(default=1.0, ge=0, le=1.1, description="Share of the turn that the head does; the eyes do the rest.")
+    head_gain: float = Field(
+        default=1.0, ge=0, le=1.1, description="Share of the turn that the head does; the eyes do the rest."
+    )
     head_lag_s: float = Field(default=-0.07, ge=-0.5, le=1, description="Head after the arm; negative: before it.")
     head_overshoot_deg: float = Field(default=0.0, ge=-10, le=10)
     torso_gain: float = Field(default=1.0, ge=0, le=2, description="Turn of the trunk, 1: as people usually do.")

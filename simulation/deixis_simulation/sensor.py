@@ -66,7 +66,8 @@ class SensorModel:
         noise = self._sensor.noise
         deviation = np.sqrt(np.maximum(mosaic, 0) * np.float32(SHOT_NOISE * noise) + np.float32((READ_NOISE * noise) ** 2))
         noisy = mosaic * self._response + grain * deviation
-        return np.clip(noisy * RAW_SCALE + RAW_BLACK, 0, 65535).astype(np.uint16)
+        raw: NDArray[np.uint16] = np.clip(noisy * RAW_SCALE + RAW_BLACK, 0, 65535).astype(np.uint16)
+        return raw
 
     def _processed(self, linear: FloatPicture) -> Picture:
         sensor = self._sensor
@@ -77,4 +78,5 @@ class SensorModel:
         ycc[..., 1:] = cv2.GaussianBlur(chroma, (0, 0), COLOUR_BLUR_PX)
         luma = ycc[..., 0].copy()
         ycc[..., 0] = luma + np.float32(sensor.sharpening) * (luma - cv2.GaussianBlur(luma, (0, 0), 1.0))
-        return np.clip(cv2.cvtColor(ycc, cv2.COLOR_YCrCb2BGR) * 255 + 0.5, 0, 255).astype(np.uint8)
+        picture: Picture = np.clip(cv2.cvtColor(ycc, cv2.COLOR_YCrCb2BGR) * 255 + 0.5, 0, 255).astype(np.uint8)
+        return picture

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Vector = Sequence[float] | Floats
+"""Three numbers."""
 
 LATHE_SIDES = 36
 PLANT_LEAVES = 60
@@ -36,7 +38,7 @@ def joined(shapes: Sequence[Shape]) -> Shape:
     )
 
 
-def quad(corner: Sequence[float], along: Sequence[float], up: Sequence[float], repeat: tuple[float, float] = (1, 1)) -> Shape:
+def quad(corner: Vector, along: Vector, up: Vector, repeat: tuple[float, float] = (1, 1)) -> Shape:
     """A parallelogram that faces along x up; the texture repeats so many times along its two sides."""
     p, a, b = (np.asarray(v, float) for v in (corner, along, up))
     normal = np.cross(a, b)
@@ -49,7 +51,7 @@ def quad(corner: Sequence[float], along: Sequence[float], up: Sequence[float], r
     )
 
 
-def box(centre: Sequence[float], size: Sequence[float], turn_deg: float = 0.0) -> Shape:
+def box(centre: Vector, size: Vector, turn_deg: float = 0.0) -> Shape:
     """A box, turned about the vertical."""
     a, b, d = (float(s) / 2 for s in size)
     faces = [
@@ -63,7 +65,7 @@ def box(centre: Sequence[float], size: Sequence[float], turn_deg: float = 0.0) -
     return placed(joined(faces), centre, turn_deg)
 
 
-def lathe(centre: Sequence[float], profile: Sequence[tuple[float, float]]) -> Shape:
+def lathe(centre: Vector, profile: Sequence[tuple[float, float]]) -> Shape:
     """A solid of revolution about the vertical; the profile is (radius, height) from below to above."""
     outline = np.asarray(profile, float)
     rings, sides = len(outline), LATHE_SIDES + 1
@@ -87,14 +89,14 @@ def lathe(centre: Sequence[float], profile: Sequence[tuple[float, float]]) -> Sh
     )
 
 
-def sphere(centre: Sequence[float], radius: float) -> Shape:
+def sphere(centre: Vector, radius: float) -> Shape:
     """A ball."""
     angle = np.linspace(-math.pi / 2, math.pi / 2, 20)
     profile = [(max(radius * math.cos(a), 1e-4), radius * math.sin(a)) for a in angle]
     return lathe(centre, profile)
 
 
-def plant(foot: Sequence[float], height: float, rng: np.random.Generator) -> Shape:
+def plant(foot: Vector, height: float, rng: np.random.Generator) -> Shape:
     """Leaves that arch out of a pot."""
     leaves = [_leaf(height, rng) for _ in range(PLANT_LEAVES)]
     return placed(joined(leaves), foot)
@@ -122,7 +124,7 @@ def _leaf(height: float, rng: np.random.Generator) -> Shape:
     )
 
 
-def placed(shape: Shape, centre: Sequence[float], turn_deg: float = 0.0) -> Shape:
+def placed(shape: Shape, centre: Vector, turn_deg: float = 0.0) -> Shape:
     """The shape turned about the vertical through its origin, then moved."""
     c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
     turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

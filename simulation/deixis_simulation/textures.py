@@ -27,7 +27,8 @@ def fractal_noise(height: int, width: int, rng: Rng, octaves: int = 5, base: int
 
 def toned(tone: Tone, brightness: FloatPicture) -> Picture:
     """One colour, brighter and darker."""
-    return np.clip(np.array(tone, np.float32) * brightness[..., None], 0, 255).astype(np.uint8)
+    picture: Picture = np.clip(np.array(tone, np.float32) * brightness[..., None], 0, 255).astype(np.uint8)
+    return picture
 
 
 def plaster(tone: Tone, rng: Rng, size: int = 512, rough: float = 0.035) -> Picture:
@@ -66,7 +67,8 @@ def brick(tone: Tone, rng: Rng, size: int = 1024, rows: int = 14, columns: int =
     bricks = np.array(tone, float) * shade[..., None]
     mortar = np.array((176.0, 170.0, 160.0)) * (1 + 0.06 * noise[..., None])
     mixed = (bricks * inside + mortar * (1 - inside)).astype(np.float32)
-    return np.clip(cv2.GaussianBlur(mixed, (0, 0), 0.8), 0, 255).astype(np.uint8)
+    picture: Picture = np.clip(cv2.GaussianBlur(mixed, (0, 0), 0.8), 0, 255).astype(np.uint8)
+    return picture
 
 
 def panels(tone: Tone, rng: Rng, size: int = 512, count: int = 4) -> Picture:
@@ -143,4 +145,5 @@ def painting(rng: Rng, width: int = 384, height: int = 288) -> Picture:
         shade = ground * (0.6 + 0.2 * layer) + 15 * rng.standard_normal(3).astype(np.float32)
         picture = np.where((rows > ridge)[..., None], shade, picture)
     strokes = 1 + 0.06 * fractal_noise(height, width, rng, base=16)[..., None]
-    return np.clip(picture * strokes, 0, 255).astype(np.uint8)
+    painted: Picture = np.clip(picture * strokes, 0, 255).astype(np.uint8)
+    return painted

@@ -10,11 +10,13 @@ out vec3 position;
 out vec3 normal;
 out vec2 coordinate;
 out float part;
+flat out float whole_part;  // of one corner: between two parts no third one shows
 
 void main() {
   position = in_position;
   normal = in_normal;
   coordinate = in_texture;
   part = in_part;
+  whole_part = in_part;
   gl_Position = view_projection * vec4(in_position, 1.0);
 }
