@@ -15,18 +15,21 @@ from numpy.typing import NDArray
 from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
+from .shadows import ShadowAtlas, coarse_triangles
 from .skinning import Mesh
 from .surface import Surface
 
 FloatPicture = NDArray[np.float32]
 
-SHADOW_TILE_PX = 512
-TILES = 4
 SAMPLES = 4
 NEAR_M, FAR_M = 0.05, 40.0
 BRIGHTEST = 30.0
-SHADOW_RADIUS_M = 1.3
-"""Around the middle of the people: what casts shadows; the rest of the room lies in the light."""
+EYE = 99
+"""Stands for the part of the body where it is an eye; the shaders know it as more than 90."""
+ROOM_SHADOW_RADIUS_M = 3.5
+"""Around the middle of the lamps: where furniture and exhibits cast shadows."""
+SHADOW_CELL_M = 0.012
+"""Details of people that are smaller cast no shadow."""
 ROOM_PASSES = 6
 """Passes with other jitter that are averaged for a room that is rendered once."""
 SHADE_SCALE = 4
@@ -52,10 +55,8 @@ class _Drawn:
 
     positions: moderngl.Buffer
     normals: moderngl.Buffer
-    seen: moderngl.VertexArray
-    depth: moderngl.VertexArray
-    cover: moderngl.VertexArray
-    label: moderngl.VertexArray
+    arrays: dict[str, moderngl.VertexArray]
+    """By the name of the program; "shadow": for shadow maps."""
     maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
     uniforms: dict[str, Any]
     person: int
@@ -78,6 +79,7 @@ class Renderer:
         # Any: moderngl's types do not tell a uniform from a varying.
         self._programs: dict[str, Any] = {
             "room": self._program("surface.vert", "room.frag"),
+            "shade": self._program("surface.vert", "shade.frag"),
             "body": self._program("surface.vert", "body.frag"),
             "person": self._program("screen.vert", "person.frag"),
             "cover": self._program("depth.vert", "cover.frag"),
@@ -97,10 +99,7 @@ class Renderer:
         small = width // SHADE_SCALE, height // SHADE_SCALE
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
         self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
-        atlas = context.depth_texture((SHADOW_TILE_PX * TILES, SHADOW_TILE_PX * TILES))
-        atlas.compare_func, atlas.filter = "<=", (moderngl.LINEAR, moderngl.LINEAR)
-        atlas.repeat_x = atlas.repeat_y = False
-        self._atlas, self._shadows = atlas, context.framebuffer(depth_attachment=atlas)
+        self._room_shadows, self._people_shadows = ShadowAtlas(context), ShadowAtlas(context)
         self._white = self._texture(np.full((4, 4, 3), 255, np.uint8))
         self._flat = self._texture(np.full((4, 4, 3), (128, 128, 255), np.uint8))
         context.enable(moderngl.DEPTH_TEST)
@@ -108,7 +107,6 @@ class Renderer:
         self._room: list[_Drawn] = []
         self._people: list[_Drawn] = []
         self._lighting: Lighting | None = None
-        self._matrices: list[Floats] = []
         self._jitters = np.random.default_rng(5).integers(0, 300, (12, 2)).astype(float)
 
     def close(self) -> None:
@@ -129,7 +127,7 @@ class Renderer:
             }
             look = self._white if surface.texture is None else self._texture(surface.texture)
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
-            self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
+            self._room.append(self._drawn(mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
 
     def add_person(self, look: Avatar, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
@@ -139,9 +137,14 @@ class Renderer:
             "hair_tint": tuple(tints.hair),
             "clothes_tint": tuple(tints.clothes),
         }
-        empty = np.zeros((len(look.part), 3))
-        mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
-        self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1, True))
+        part = np.where(look.is_eye, EYE, look.part)
+        mesh = look.vertices, np.zeros((len(part), 3)), look.texture_coordinates, part, look.triangles
+        person = self._drawn(mesh, maps, uniforms, len(self._people) + 1, True)
+        coarse = coarse_triangles(look.vertices, look.triangles, look.part, SHADOW_CELL_M)
+        index = self._context.buffer(coarse.tobytes())
+        places = [(person.positions, "3f", "in_position")]
+        person.arrays["shadow"] = self._context.vertex_array(self._programs["depth"], places, index)
+        self._people.append(person)
 
     def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
@@ -149,32 +152,28 @@ class Renderer:
             drawn.positions.write(np.ascontiguousarray(mesh.vertices, np.float32).tobytes())
             drawn.normals.write(np.ascontiguousarray(mesh.normals, np.float32).tobytes())
 
-    def light(self, lighting: Lighting, centre: Floats, *, people: bool = True) -> None:
-        """Set the lamps, and draw their shadow maps around `centre` (world); `people` False: of the room alone."""
+    def light(self, lighting: Lighting, centre: Floats) -> None:
+        """Set the lamps, and draw the shadows of the room around `centre` (world). After add_room()."""
         self._lighting = lighting
-        self._shadows.use()
-        self._shadows.clear(depth=1.0)
-        program = self._programs["depth"]
-        self._matrices = [_lamp_matrix(lamp.position, centre) for lamp in lighting.lamps]
-        casting = [drawn for drawn in (*self._room, *(self._people if people else ())) if drawn.casts_shadow]
-        for number, matrix in enumerate(self._matrices):
-            column, row = number % TILES, number // TILES
-            self._context.viewport = (column * SHADOW_TILE_PX, row * SHADOW_TILE_PX, SHADOW_TILE_PX, SHADOW_TILE_PX)
-            program["view_projection"].write(_uniform(matrix.T))
-            for drawn in casting:
-                drawn.depth.render()
+        casting = [drawn.arrays["shadow"] for drawn in self._room if drawn.casts_shadow]
+        self._room_shadows.draw(self._programs["depth"], lighting.lamps, centre, ROOM_SHADOW_RADIUS_M, casting)
+
+    def cast_people(self, centre: Floats, radius_m: float) -> None:
+        """Draw the shadows of people, as they stand, in a ball around `centre` (world). After light()."""
+        casting = [drawn.arrays["shadow"] for drawn in self._people]
+        self._people_shadows.draw(self._programs["depth"], self._lit().lamps, centre, radius_m, casting)
 
     # --- pictures -----------------------------------------------------------------------------------------------------
 
     def room(self, view: View, passes: int = ROOM_PASSES) -> FloatPicture:
-        """The room without people (h, w, 3), linear; light() decides whose shadows fall into it."""
-        pictures = [self._pass(view, self._room, self._sampled, jitter)[..., :3] for jitter in self._jitters[:passes]]
+        """The room without people and their shadows (h, w, 3), linear."""
+        pictures = [self._pass(view, "room", self._sampled, jitter) for jitter in self._jitters[:passes]]
         mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
         return mean
 
     def shade(self, view: View) -> FloatPicture:
-        """The room at a quarter of the size, without people; one with and one without their shadows give the shadows."""
-        pictures = [self._pass(view, self._room, self._small, jitter)[..., :3] for jitter in self._jitters[:2]]
+        """Share of the room's light that people leave to it (h / 4, w / 4, 3). After cast_people()."""
+        pictures = [self._pass(view, "shade", self._small, jitter) for jitter in self._jitters[:2]]
         mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
         return mean
 
@@ -185,7 +184,9 @@ class Renderer:
         self._draw_bodies(matrix, view)
         self._resolved.use()
         self._context.disable(moderngl.DEPTH_TEST)
-        self._set_light(self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)])
+        self._set_light(
+            self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)], self._people_shadows
+        )
         names = "albedo_map", "normal_map", "flat_map", "position_map"
         for unit, (name, content) in enumerate(zip(names, self._bodies, strict=True)):
             content.use(unit + 4)
@@ -205,7 +206,7 @@ class Renderer:
         for drawn in (*self._room, *self._people):
             drawn.maps[2].use(2)
             program["person"] = float(drawn.person)
-            drawn.label.render()
+            drawn.arrays["label"].render()
         raw = _bytes_of(self._labels, 4)
         part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
         packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
@@ -213,16 +214,17 @@ class Renderer:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _pass(self, view: View, drawn: Sequence[_Drawn], target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
-        program = self._programs["room"]
+    def _pass(self, view: View, kind: str, target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
+        program, matrix = self._programs[kind], _view_projection(view)
         target.use()
-        self._context.viewport = (0, 0, *target.size)
-        target.clear(0.0, 0.0, 0.0, 0.0)
-        self._set_light(program, _view_projection(view), view, jitter)
-        for item in drawn:
+        empty = 0.0 if kind == "room" else 1.0
+        target.clear(empty, empty, empty, empty)
+        self._hide_behind_room(matrix)  # so that what lies behind is not lit in vain
+        self._set_light(program, matrix, view, jitter, self._room_shadows if kind == "room" else self._people_shadows)
+        for item in self._room:
             self._set_look(program, item)
-            item.seen.render()
-        return self._read(target)
+            item.arrays[kind].render()
+        return self._read(target)[..., :3]
 
     def _cover(self, matrix: Floats) -> FloatPicture:
         """Share of each pixel (h, w, 1) that people cover."""
@@ -232,7 +234,7 @@ class Renderer:
         self._hide_behind_room(matrix)
         self._programs["cover"]["view_projection"].write(_uniform(matrix.T))
         for item in self._people:
-            item.cover.render()
+            item.arrays["cover"].render()
         self._context.copy_framebuffer(self._covered, self._covering)
         return _bytes_of(self._covered, 1).astype(np.float32) / np.float32(255)
 
@@ -245,12 +247,12 @@ class Renderer:
         program["camera"] = tuple(view.centre)
         for item in self._people:
             self._set_look(program, item)
-            item.seen.render()
+            item.arrays["body"].render()
 
     def _hide_behind_room(self, matrix: Floats) -> None:
         self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
         for item in self._room:
-            item.depth.render()
+            item.arrays["depth"].render()
 
     def _set_look(self, program: Any, item: _Drawn) -> None:
         for unit, (name, look) in enumerate(zip(("albedo_map", "normal_map", "skin_mask"), item.maps, strict=True)):
@@ -269,32 +271,37 @@ class Renderer:
         raw = np.frombuffer(target.read(components=4, dtype="f2"), np.float16).reshape(height, width, 4)[::-1]
         return np.clip(np.nan_to_num(raw.astype(np.float32), posinf=BRIGHTEST), 0, BRIGHTEST)
 
-    def _set_light(self, program: Any, matrix: Floats, view: View, jitter: Floats) -> None:
-        assert self._lighting is not None, "light() comes before any picture"
-        lamps = self._lighting.lamps
+    def _set_light(self, program: Any, matrix: Floats, view: View, jitter: Floats, shadows: ShadowAtlas) -> None:
+        lighting = self._lit()
+        lamps = lighting.lamps
         padded = MAX_LAMPS - len(lamps)
         values: dict[str, Any] = {
             "view_projection": _uniform(matrix.T),
             "lamp_position": _uniform([*(lamp.position for lamp in lamps), *np.zeros((padded, 3))]),
             "lamp_colour": _uniform([*(lamp.colour for lamp in lamps), *np.zeros((padded, 3))]),
-            "lamp_matrix": _uniform([*(m.T for m in self._matrices), *np.tile(np.eye(4), (padded, 1, 1))]),
-            "lamp_softness": _uniform([*(lamp.softness for lamp in lamps), *np.zeros(padded)]),
+            "lamp_matrix": _uniform([*(m.T for m in shadows.matrices), *np.tile(np.eye(4), (padded, 1, 1))]),
+            "lamp_softness": _uniform([*shadows.softness, *np.zeros(padded)]),
             "lamp_reach2": _uniform([*(lamp.reach2_m2 for lamp in lamps), *np.zeros(padded)]),
             "camera": _uniform(view.centre),
-            "ambient_up": _uniform(self._lighting.ambient_up),
-            "ambient_down": _uniform(self._lighting.ambient_down),
+            "ambient_up": _uniform(lighting.ambient_up),
+            "ambient_down": _uniform(lighting.ambient_down),
             "jitter": _uniform(jitter),
+            "shadow_raise": _uniform(shadows.raised_m),
         }
         for name, value in values.items():
             if name in program:
                 program[name].write(value)
-        self._atlas.use(3)
+        shadows.texture.use(3)
         program["lamps"], program["key_lamps"] = len(lamps), sum(lamp.key for lamp in lamps)
         program["shadow_map"] = 3
 
+    def _lit(self) -> Lighting:
+        if self._lighting is None:
+            raise RuntimeError("light() comes before any picture")
+        return self._lighting
+
     def _drawn(
         self,
-        kind: str,
         mesh: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]],
         maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture],
         uniforms: dict[str, Any],
@@ -303,19 +310,20 @@ class Renderer:
     ) -> _Drawn:
         positions, normals, coordinates, part, triangles = mesh
         buffer = self._context.buffer
-        moving = bool(person)
-        at = buffer(_uniform(positions), dynamic=moving)
-        up = buffer(_uniform(normals), dynamic=moving)
+        at = buffer(_uniform(positions), dynamic=bool(person))
+        up = buffer(_uniform(normals), dynamic=bool(person))
         fixed = buffer(_uniform(np.hstack([coordinates, np.asarray(part, float)[:, None]])))
         index = buffer(np.ascontiguousarray(triangles, np.int32).tobytes())
-        whole = [(at, "3f", "in_position"), (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
-
-        def array(program: str, content: list[tuple[Any, ...]]) -> moderngl.VertexArray:
-            return self._context.vertex_array(self._programs[program], content, index, skip_errors=True)
-
         places = [(at, "3f", "in_position")]
-        depth, cover = array("depth", places), array("cover", places)
-        return _Drawn(at, up, array(kind, whole), depth, cover, array("label", whole), maps, uniforms, person, casts_shadow)
+        whole = [*places, (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
+        wanted = {"label": whole, "depth": places}
+        wanted |= {"body": whole, "cover": places} if person else {"room": whole, "shade": whole}
+        arrays = {
+            name: self._context.vertex_array(self._programs[name], content, index, skip_errors=True)
+            for name, content in wanted.items()
+        }
+        arrays["shadow"] = arrays["depth"]
+        return _Drawn(at, up, arrays, maps, uniforms, person, casts_shadow)
 
     def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
         content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])
@@ -350,11 +358,10 @@ def _edged(light: FloatPicture, cover: FloatPicture) -> FloatPicture:
     return np.concatenate([filled * cover, cover], axis=2)
 
 
-def shadows_on(room: FloatPicture, plain: FloatPicture, shaded: FloatPicture) -> FloatPicture:
-    """The room with people's shadows: (h, w, 3) darkened by what two small pictures, without and with people, differ."""
-    share = np.clip((shaded + 0.003) / (plain + 0.003), 0, 1.03)
+def shadows_on(room: FloatPicture, share: FloatPicture) -> FloatPicture:
+    """The room (h, w, 3) with people's shadows, of which `share` (h / 4, w / 4, 3) is left; see Renderer.shade."""
     height, width = room.shape[:2]
-    soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_CUBIC)
+    soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_LINEAR)
     return (room * soft).astype(np.float32)
 
 
@@ -377,24 +384,4 @@ def _view_projection(view: View) -> Floats:
     projection[3, 2] = 1
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = view.rotation, view.translation
-    return projection @ pose
-
-
-def _lamp_matrix(position: Floats, centre: Floats) -> Floats:
-    """A lamp looks at the people as a camera would; the cone just holds a ball around them."""
-    ahead = np.asarray(centre, float) - position
-    distance = float(np.linalg.norm(ahead))
-    ahead = ahead / distance
-    up = np.array((0.0, 1.0, 0.0)) if abs(ahead[1]) < 0.95 else np.array((0.0, 0.0, 1.0))
-    right = np.cross(ahead, up)
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
-    zoom = 1 / np.tan(np.arcsin(min(SHADOW_RADIUS_M / distance, 0.93)))
-    near, far = max(0.25, distance - 1.3 * SHADOW_RADIUS_M), distance + 2.2 * SHADOW_RADIUS_M
-    projection = np.zeros((4, 4))
-    projection[0, 0] = projection[1, 1] = zoom
-    projection[2, 2], projection[2, 3] = (far + near) / (far - near), -2 * far * near / (far - near)
-    projection[3, 2] = 1
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, -rotation @ position
     return projection @ pose
