@@ -162,7 +162,9 @@ def _site_walls(room: Room, rng: Rng) -> list[Surface]:
             continue
         turn = math.degrees(math.atan2(-(b - a)[2], (b - a)[0]))
         centre = (a + b) / 2 + np.array((0.0, room.ceiling_m / 2, 0.0))
-        surfaces.append(Surface(box(centre, (length, room.ceiling_m, WALL_THICKNESS_M), turn), look, roughness=0.9, gloss=0.05))
+        wall = box(centre, (length, room.ceiling_m, WALL_THICKNESS_M), turn)
+        # No shadow: each room of a site has lamps of its own, here there are those around the people alone.
+        surfaces.append(Surface(wall, look, roughness=0.9, gloss=0.05, casts_shadow=False))
     return surfaces
 
 

@@ -30,6 +30,7 @@ from deixis_simulation.scene import (
     Waypoint,
 )
 from deixis_simulation.sensor import SensorModel
+from deixis_simulation.shadows import coarse_triangles
 from deixis_simulation.stage import Stage
 
 CAMERA = Camera(width=160, height=120)
@@ -51,6 +52,10 @@ class BoxBody:
     part: np.ndarray
 
     @property
+    def is_eye(self):
+        return np.zeros(len(self.part), bool)
+
+    @property
     def triangles(self):
         return self.mesh.triangles
 
@@ -65,6 +70,14 @@ class BoxBody:
     @property
     def normals(self):
         return self.mesh.normals.astype(np.float32)
+
+
+class EyedBody(BoxBody):
+    """Its head is one large eye."""
+
+    @property
+    def is_eye(self):
+        return self.part == 1
 
 
 def body(place=(2.0, 0.0)):
@@ -106,6 +119,15 @@ def test_a_shape_has_unit_normals_and_triangles_of_its_own_vertices(shape):
 @pytest.mark.parametrize("shape", [shapes.box((0, 0, 0), (1, 2, 3), 30), shapes.sphere((0, 0, 0), 0.3)])
 def test_normals_point_outward(shape):
     assert (np.einsum("ij,ij->i", shape.vertices, shape.normals) > 0).all()
+
+
+def test_coarse_triangles_are_fewer_and_of_one_part_each():
+    ball = shapes.sphere((0, 0, 0), 0.1)
+    part = (ball.vertices[:, 1] > 0).astype(int)
+    coarse = coarse_triangles(ball.vertices, ball.triangles, part, 0.03)
+    assert 20 < len(coarse) < len(ball.triangles) / 2
+    assert np.ptp(ball.vertices[np.unique(coarse)], axis=0) == pytest.approx([0.2] * 3, abs=0.06)
+    assert (coarse[:, 0] != coarse[:, 1]).all()
 
 
 @pytest.mark.parametrize("kind", ["plaster", "brick", "wood", "panel"])
@@ -227,6 +249,36 @@ class TestRendering:
         empty.close()
         full.close()
 
+    def test_shadows_of_the_room_stay_where_they_are_when_a_person_walks(self):
+        furniture = [Furniture(kind="cabinet", along_m=0.8), Furniture(kind="bench", along_m=-0.8, off_wall_m=0.1)]
+        stage = Stage(scene(people=[PERSON], room=Room(front_x_m=3.6, furniture=furniture)), [body()])
+        view = view_at(CAMERA, RobotState())
+        far, near = (stage.picture(view, [[body((x, 6.0))]]) for x in (-3.0, 3.0))
+        stage.close()
+        assert np.abs(far - near).max() < 0.02, "the person is beside the picture, however near to the furniture"
+
+    def test_everyone_of_a_group_throws_a_shadow(self):
+        people = [Person(avatar="box", place_m=(3.0, y)) for y in (1.5, -1.5)]
+        looking_down = CAMERA.model_copy(update={"pitch_up_deg": -20.0, "horizontal_fov_deg": 90.0})
+        stage = Stage(scene(people=people), [body(), body()])
+        view = view_at(looking_down, RobotState())
+        meshes = [body((3.0, 1.5)), body((3.0, -1.5))]
+        shadowed, labels = stage.picture(view, [meshes]), stage.labels(view, meshes)
+        stage.close()
+        empty = Stage(scene(people=[]), [])
+        plain = empty.picture(view, [[]])
+        empty.close()
+        darker = (plain - shadowed).mean(axis=2) * (labels == 0)
+        assert min(darker[:, :80].max(), darker[:, 80:].max()) > 0.01
+
+    def test_eyes_are_no_skin(self):
+        person = body()
+        with_eyes = EyedBody(person.mesh, person.colours, person.normal_map, person.skin_mask, person.part)
+        stage = Stage(scene(people=[PERSON]), [with_eyes])
+        labels = stage.labels(view_at(CAMERA, RobotState()), [with_eyes])
+        stage.close()
+        assert set(np.unique(labels)) == {0, 7, 1}, "head, but not skin"
+
     def test_motion_between_the_subframes_blurs(self):
         stage = Stage(scene(people=[PERSON]), [body()])
         view = view_at(CAMERA, RobotState())
@@ -249,6 +301,7 @@ class TestRendering:
         renderer.pose([body()])
         centre = to_world((2.0, 0.0))
         renderer.light(lighting(Light(), centre), centre + UP * 1.05)
+        renderer.cast_people(centre + UP * 1.05, 1.3)
         people = renderer.people(view_at(CAMERA.model_copy(update={"roll_deg": 5.0}), RobotState()))
         renderer.close()
         cover = people[..., 3]
