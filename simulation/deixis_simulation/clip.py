@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .actor import Actor, Mesh, Moment
+from .actor import Actor, Moment
 from .avatars import load_avatar
 from .clip_files import ClipFiles, packed, publish, write_pictures, write_truth
 from .encode import Encoder
@@ -20,6 +20,7 @@ from .pixels import pixel
 from .scene import Scene
 from .sensor import SensorModel
 from .skin_tone import skin_tone
+from .skinning import Mesh
 from .stage import Stage, subframes_for
 from .truth import SIDES, Seen, TruthWriter
 from .truth_meta import meta_truth
@@ -76,19 +77,25 @@ class _Clip:
         time_s = number / self._scene.fps
         robot = robot_at(self._scene.robot_path, time_s)
         view = view_at(self._scene.camera, robot)
-        times = _exposure_times(time_s, self._scene.sensor.shutter_s, subframes_for(self._motion_px(time_s, view)))
-        light = self._stage.picture(view, [self._meshes(self._moments(at_s)) for at_s in times])
+        moments = self._moments(time_s)
+        meshes = self._meshes(moments)
+        light = self._stage.picture(view, self._exposure(time_s, view, meshes))
         if number == 0:
             self._sensor.meter(light)
         picture = self._sensor.expose(light, number, self._gains[number])
-        moments = self._moments(time_s)
-        meshes = self._meshes(moments)
         labels = self._stage.labels(view, meshes)
         seen = [Seen(*person) for person in zip(self._avatars, moments, (mesh.vertices for mesh in meshes), strict=True)]
         self.truth.append(self._writer.frame(number, view, robot, seen, labels, self._gains[number]))
         if number == 0:
             self.skin_tones = {person: skin_tone(picture, face_mask(labels, person)) for person in range(len(seen))}
         return picture, labels
+
+    def _exposure(self, time_s: float, view: View, middle: list[Mesh]) -> list[list[Mesh]]:
+        """The people at moments spread over the time that the shutter is open; one alone is the middle."""
+        count = subframes_for(self._motion_px(time_s, view))
+        shutter_s = self._scene.sensor.shutter_s
+        times = [time_s + ((number + 0.5) / count - 0.5) * shutter_s for number in range(count)]
+        return [middle] if count == 1 else [self._meshes(self._moments(at_s)) for at_s in times]
 
     def _moments(self, time_s: float) -> list[Moment]:
         return [actor.moment(max(time_s, 0.0)) for actor in self._actors]
@@ -106,7 +113,3 @@ class _Clip:
 def _limb_pixels(moments: Sequence[Moment], view: View) -> NDArray[np.float64]:
     points = [point for moment in moments for point in (moment.head_centre, *(moment.fingertip[side] for side in SIDES))]
     return np.array([pixel(point, view, 3) for point in points])
-
-
-def _exposure_times(time_s: float, shutter_s: float, count: int) -> list[float]:
-    return [time_s + ((number + 0.5) / count - 0.5) * shutter_s for number in range(count)]

@@ -25,9 +25,10 @@ class Encoder:
             path.open("wb").close()  # FFmpeg opens it with the first frame only
             # Faststart: a player that streams the file has the index first.
             self._file = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
-            # One thread: the bytes must not depend on the number of cores.
+            # One thread: the bytes must not depend on the number of cores. No macroblock tree, which cameras do without, too:
+            # with it, the same pictures gave other bytes in other processes.
             self._stream = self._file.add_stream(
-                "libx264", rate=fps, options={"crf": f"{crf:g}", "preset": "medium", "threads": "1"}
+                "libx264", rate=fps, options={"crf": f"{crf:g}", "preset": "medium", "threads": "1", "x264-params": "mbtree=0"}
             )
         except (OSError, ValueError) as error:
             raise EncodeError(f"film '{path}' cannot be written: {error}") from None

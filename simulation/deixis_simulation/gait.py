@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from .rotations import azimuth_deg
 from .scene import ArmSide, Person, Scene, Walk
 from .skeleton import SIDES, Leg, Posture
 
-_RAMP_S = 0.6
-_TURN_BASE_S, _TURN_DEG_PER_S = 0.25, 200.0
+_RAMP_S = 0.4
+_TURNED_AFTER_S = 0.1
+"""The last turn ends that long after the last step: who comes to point does not stop before it turns."""
+_TURN_BASE_S, _TURN_DEG_PER_S = 0.2, 260.0
 _DEG_PER_STEP = 60.0
 _STRIDE_OF_LEG = 1.43
 """Stride (two steps) at 1.1 m/s, in lengths of the leg; it grows with the root of the speed."""
@@ -41,7 +43,7 @@ class Stance:
 
 @dataclass(frozen=True)
 class WalkPlan:
-    """One walk: the person turns, goes straight on, turns again. Places (3,) in the world."""
+    """One walk: the person turns, goes straight on, turns again at its end. Places (3,) in the world."""
 
     start_s: float
     start: Floats
@@ -68,7 +70,8 @@ class WalkPlan:
     @property
     def end_s(self) -> float:
         """When the person stands again."""
-        return self.start_s + sum(self._times_s)
+        first, way, last = self._times_s
+        return self.start_s + first + max(way + _TURNED_AFTER_S, last)
 
     def at(self, time_s: float) -> Stance:
         """The stance at a time between start and end."""
@@ -76,10 +79,14 @@ class WalkPlan:
         since = time_s - self.start_s
         if since < first:
             return self._turning(self.start, self.azimuths_deg[0], self.azimuths_deg[1], since / first)
-        if since <= first + way:
-            return self._going(since - first, way)
-        return self._turning(
-            self.end, self.azimuths_deg[1], self.azimuths_deg[2], min((since - first - way) / max(last, 1e-9), 1.0)
+        going = self._going(min(since - first, way), way)
+        share = min(max(1 - (self.end_s - time_s) / last, 0.0), 1.0)
+        turning = self._turning(self.end, self.azimuths_deg[1], self.azimuths_deg[2], share)
+        return replace(
+            going,
+            azimuth_deg=turning.azimuth_deg,
+            stride_rad=going.stride_rad + turning.stride_rad,
+            lift=max(going.lift, turning.lift),
         )
 
     def _going(self, since_s: float, way_s: float) -> Stance:
@@ -134,7 +141,7 @@ def walk(posture: Posture, body: Body, stance: Stance) -> None:
     }
     posture.legs = legs
     rise = max(_foot_reach(body, leg) for leg in legs.values())
-    posture.offset = np.array([0.0, rise - leg_length(body), 0.0])
+    posture.offset = posture.offset + np.array([0.0, rise - leg_length(body), 0.0])
     sway = stance.swing * math.sin(phase)
     posture.hips = (posture.hips[0] - 6 * sway, posture.hips[1] + 2 * stance.swing, posture.hips[2] + 2.5 * sway)
     posture.spine = (posture.spine[0] + 10 * sway, posture.spine[1], posture.spine[2])
@@ -157,13 +164,13 @@ def _leg(body: Body, stance: Stance, phase: float) -> Leg:
 def _foot_reach(body: Body, leg: Leg) -> float:
     """How far below the hip the lowest point of heel and ball is."""
     shank_deg = leg.swing_deg - leg.knee_deg
-    foot = math.radians(shank_deg + leg.ankle_deg)
+    foot = math.radians(leg.foot_up_deg)
     ankle = body.length("RightUpLeg") * math.cos(math.radians(leg.swing_deg)) + body.length("RightLeg") * math.cos(
         math.radians(shank_deg)
     )
     height = float(body.joint("RightFoot")[1])
     ball = float(body.joint("RightToeBase")[2] - body.joint("RightFoot")[2])
-    heel = -0.05 * body.scale
+    heel = -0.08 * body.scale
     # A foot that is turned up by `foot` has its ball higher and its heel lower.
     return ankle + max(height * math.cos(foot) - along * math.sin(foot) for along in (ball, heel))
 
@@ -175,7 +182,7 @@ def _swinging_arm(body: Body, side: ArmSide, phase: float, swing: float) -> Arm:
     fore = (sign * 0.03, -math.cos(bent), math.sin(bent))
     hand = (fore[0], fore[1] - 0.1, fore[2])
     upper = (sign * 0.15, -math.cos(angle), math.sin(angle) - 0.04)
-    return arm_from_directions(body, side, np.eye(3), upper, fore, hand, REST, pronation_deg=20)
+    return arm_from_directions(body, side, np.eye(3), upper, fore, hand, REST, palm=(-sign, 0.0, -0.3))
 
 
 def _turn_s(turn_deg: float) -> float:

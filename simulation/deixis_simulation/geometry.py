@@ -90,6 +90,13 @@ class View:
         """Optical centre, world."""
         return -self.rotation.T @ self.translation
 
+    def part(self, left: int, top: int, width: int, height: int) -> View:
+        """The view through a window of the picture, pixels."""
+        matrix = self.matrix.copy()
+        matrix[0, 2] -= left
+        matrix[1, 2] -= top
+        return View(width, height, matrix, self.rotation, self.translation)
+
     def in_camera(self, points: Floats) -> Floats:
         """World points (..., 3) in camera axes."""
         return points @ self.rotation.T + self.translation

@@ -115,7 +115,7 @@ def _scratch(do: Doing) -> Arms:
 
 
 def _phone(do: Doing) -> Arms:
-    return do.at_head((0.115, -0.15, 0.03), (-0.12, 1.0, -0.25), CLAW, INWARD, (0.6, -1.0, 0.2))
+    return do.at_head((0.135, -0.15, 0.03), (-0.04, 1.0, -0.25), CLAW, INWARD, (0.6, -1.0, 0.2))
 
 
 def _beats(do: Doing) -> Arms:
@@ -161,7 +161,7 @@ def _chin(do: Doing) -> Arms:
 def _hair(do: Doing) -> Arms:
     """The hand goes over the hair, from the forehead back."""
     back = 0.5 - 0.5 * math.cos(math.pi * do.progress * _PASSES)
-    place = (0.19 - 0.01 * back, 0.005, 0.09 - 0.12 * back)
+    place = (0.20 - 0.01 * back, 0.03, 0.09 - 0.12 * back)
     hand = (-0.9, 0.46, -0.1 - 0.2 * back)
     return do.at_head(place, hand, mix_shapes(CLAW, FLAT, 0.6), (-0.5, -0.9, -0.1), (1.0, -0.2, 0.2))
 

@@ -18,7 +18,7 @@ from .idle import Idle
 from .rotations import UP, azimuth_deg, elevation_deg, heading_vector, unit
 from .scene import ArmSide, Pointing
 from .skeleton import Posture, Skeleton, solve
-from .trunk import Look, azimuth_of, enough_trunk_deg, usual_trunk_deg
+from .trunk import Look, azimuth_of, enough_trunk_deg, reachable_deg, usual_trunk_deg
 
 _HEAD_PITCH_SHARE = 0.55
 _HEAD_RELEASE_S = 0.12
@@ -59,14 +59,17 @@ def plan_pointing(
     """Work out a pointing. `posture`: of the person before it; `target`, `camera`: in the person's frame, metres."""
     posture = copy.copy(posture)
     posture.arms = dict(posture.arms)
-    eyes = body.eyes + posture.offset
-    way = target - eyes
-    azimuth = azimuth_of(way, outward(action.arm))
-    look = _look(action, azimuth, elevation_deg(way), azimuth_deg(camera - eyes), float(dice.uniform(-2, 2)))
-    trunk = _trunk_deg(action, azimuth, look.head[0])
-    posture.turn_trunk(trunk)
-    posture.head = look.head
-    reach = float(dice.uniform(0.95, 1.0))
+    roll, reach = float(dice.uniform(-2, 2)), float(dice.uniform(0.95, 1.0))
+    trunk = 0.0
+    for _ in range(2):
+        # Trunk and head move the place that the angles are measured from; so once more from there.
+        middle = solve(body, posture).carried("Head", body.head_centre)
+        way = target - middle
+        azimuth = azimuth_of(way, outward(action.arm))
+        before, trunk = trunk, _trunk_deg(action, azimuth)
+        look = _look(action, azimuth, elevation_deg(way), camera - middle, trunk, roll)
+        posture.turn_trunk(trunk - before)
+        posture.head = look.head
     return PointingPlan(action, trunk, pointing_arm(action, body, posture, target, reach), look)
 
 
@@ -89,18 +92,25 @@ def _straight_arm(action: Pointing, body: Body, posture: Posture, target: Floats
     shoulder, eyes = skeleton.position(f"{prefix}Arm"), skeleton.carried("Head", body.eyes)
     finger = float(np.linalg.norm(body.fingertip[side] - body.joint(f"{prefix}Hand")))
     length = (body.length(f"{prefix}Arm") + body.length(f"{prefix}ForeArm")) * reach + finger
-    tip = shoulder + length * unit(unit(_on_ray(eyes, target, shoulder, length) - shoulder) + unit(target - shoulder))
-    hand = unit(0.6 * unit(target - tip) + 0.4 * unit(tip - shoulder))
     elbow_toward = -UP + chest @ np.array([outward(side) * 0.55, 0.0, -0.25])
-    wrist = tip - hand * finger
+    missed = np.zeros(3)
     for _ in range(_ROUNDS):
+        # The clavicle brings the shoulder forward, the finger is no straight continuation of the hand: once more from there.
+        tip = _tip(shoulder, eyes, target, length)
+        hand = unit(0.6 * unit(target - tip) + 0.4 * unit(tip - shoulder))
+        wrist = tip - hand * finger + missed
         arm = arm_to_wrist(body, side, chest, shoulder, wrist, elbow_toward, hand, shape, pronation_deg=action.pronation_deg)
-        # The clavicle moves the shoulder, the finger is no straight continuation of the hand: correct by what is missing.
         posture.arms[side] = arm
         skeleton = solve(body, posture)
         shoulder = skeleton.position(f"{prefix}Arm")
-        wrist = wrist + (tip - fingertip(skeleton, side))
+        missed = missed + _tip(shoulder, eyes, target, length) - fingertip(skeleton, side)
     return arm
+
+
+def _tip(shoulder: Floats, eyes: Floats, target: Floats, length: float) -> Floats:
+    """Half-way between the lines from eyes and shoulder to the target, as far from the shoulder as the arm is long."""
+    on_sight = unit(_on_ray(eyes, target, shoulder, length) - shoulder)
+    return shoulder + length * unit(on_sight + unit(target - shoulder))
 
 
 def _bent_arm(action: Pointing, body: Body, posture: Posture, target: Floats) -> Arm:
@@ -138,19 +148,26 @@ def _on_ray(start: Floats, target: Floats, centre: Floats, radius: float) -> Flo
     return leaves
 
 
-def _look(action: Pointing, azimuth: float, elevation: float, to_camera: float, roll: float) -> Look:
-    if action.looks == "robot":
-        return Look((to_camera, 0.0, roll), (0.0, 0.0))
-    if action.looks == "elsewhere":
-        return Look((to_camera + action.elsewhere_deg, 0.0, roll), (0.0, 0.0))
-    head = azimuth * action.head_gain + float(np.sign(azimuth)) * action.head_overshoot_deg
+def _look(action: Pointing, azimuth: float, elevation: float, to_camera: Floats, trunk: float, roll: float) -> Look:
+    if action.looks != "poi":
+        aside = action.elsewhere_deg if action.looks == "elsewhere" else 0.0
+        # People look up or down at a robot; elsewhere there is nothing to look at.
+        up = elevation_deg(to_camera) if action.looks == "robot" else 0.0
+        pitch = up * _HEAD_PITCH_SHARE
+        return Look((reachable_deg(azimuth_deg(to_camera) + aside, trunk), pitch, roll), (0.0, up - pitch))
+    head = reachable_deg(_head_deg(action, azimuth), trunk)
     pitch = elevation * _HEAD_PITCH_SHARE
     return Look((head, pitch, roll), (azimuth - head, elevation - pitch))
 
 
-def _trunk_deg(action: Pointing, azimuth: float, head: float) -> float:
-    """As people usually do, times the gain; but as much as arm and neck need."""
+def _head_deg(action: Pointing, azimuth: float) -> float:
+    return azimuth * action.head_gain + float(np.sign(azimuth)) * action.head_overshoot_deg
+
+
+def _trunk_deg(action: Pointing, azimuth: float) -> float:
+    """As people usually do, times the gain; but as much as the arm needs, and the neck if the head looks there."""
     wanted = usual_trunk_deg(azimuth) * action.torso_gain
     across, out = _ACROSS_DEG[action.style], _OUT_DEG[action.style]
     left, right = (out, across) if action.arm == "left" else (across, out)
-    return enough_trunk_deg(min(max(wanted, azimuth - left), azimuth + right), head)
+    enough = min(max(wanted, azimuth - left), azimuth + right)
+    return enough_trunk_deg(enough, _head_deg(action, azimuth) if action.looks == "poi" else enough)

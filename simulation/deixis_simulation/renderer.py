@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
 from .shadows import ShadowAtlas, coarse_triangles
+from .shapes import Shape, joined
+from .skinning import Mesh
 from .surface import Surface
 
 FloatPicture = NDArray[np.float32]
@@ -22,12 +25,12 @@ FloatPicture = NDArray[np.float32]
 SAMPLES = 4
 NEAR_M, FAR_M = 0.05, 40.0
 BRIGHTEST = 30.0
-EYE = 99
-"""Stands for the part of the body where it is an eye; the shaders know it as more than 90."""
 ROOM_SHADOW_RADIUS_M = 3.5
 """Around the middle of the lamps: where furniture and exhibits cast shadows."""
 SHADOW_CELL_M = 0.012
 """Details of people that are smaller cast no shadow."""
+EYE = 99
+"""Stands for the part of the body where it is an eye; the shaders know it as more than 90."""
 ROOM_PASSES = 6
 """Passes with other jitter that are averaged for a room that is rendered once."""
 SHADE_SCALE = 4
@@ -36,26 +39,6 @@ SHADE_SCALE = 4
 
 class RenderError(RuntimeError):
     """The renderer cannot work here; the text says what to install."""
-
-
-class Look(Protocol):
-    """How a person looks: its mesh at rest, and its pictures."""
-
-    vertices: NDArray[Any]
-    triangles: NDArray[Any]
-    texture_coordinates: NDArray[Any]
-    part: NDArray[Any]
-    is_eye: NDArray[Any]
-    colours: NDArray[np.uint8]
-    normal_map: NDArray[np.uint8]
-    skin_mask: NDArray[np.uint8]
-
-
-class Posed(Protocol):
-    """A person's mesh at one time, world: vertices and unit normals (n, 3) float32."""
-
-    vertices: NDArray[np.float32]
-    normals: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -74,11 +57,40 @@ class _Drawn:
     positions: moderngl.Buffer
     normals: moderngl.Buffer
     arrays: dict[str, moderngl.VertexArray]
-    """By the name of the program; "shadow": for shadow maps."""
+    """By the name of the program."""
     maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
     uniforms: dict[str, Any]
     person: int
-    casts_shadow: bool
+
+
+@dataclass(frozen=True)
+class _PeopleTargets:
+    """Where people are drawn, for one size of the window around them.
+
+    sampled, cover: how much of a pixel they cover, several samples a pixel and their mean; body, made_of: what they are
+    made of; lit: with the light on it.
+    """
+
+    sampled: moderngl.Framebuffer
+    cover: moderngl.Framebuffer
+    body: moderngl.Framebuffer
+    made_of: tuple[moderngl.Texture, ...]
+    lit: moderngl.Framebuffer
+    labels: moderngl.Framebuffer
+
+    @classmethod
+    def of(cls, context: moderngl.Context, size: tuple[int, int]) -> _PeopleTargets:
+        """New ones."""
+        grey = context.renderbuffer(size, 1, samples=SAMPLES)
+        made_of = tuple(context.texture(size, 4, dtype=kind) for kind in ("f2", "f2", "f2", "f4"))
+        return cls(
+            sampled=context.framebuffer([grey], context.depth_renderbuffer(size, samples=SAMPLES)),
+            cover=context.framebuffer([context.texture(size, 1)]),
+            body=context.framebuffer(made_of, context.depth_renderbuffer(size)),
+            made_of=made_of,
+            lit=context.framebuffer([context.texture(size, 4, dtype="f2")]),
+            labels=context.framebuffer([context.texture(size, 4)], context.depth_renderbuffer(size)),
+        )
 
 
 class Renderer:
@@ -107,24 +119,22 @@ class Renderer:
         colour = context.renderbuffer(self._size, 4, samples=SAMPLES, dtype="f2")
         self._sampled = context.framebuffer([colour], context.depth_renderbuffer(self._size, samples=SAMPLES))
         self._resolved = context.framebuffer([context.texture(self._size, 4, dtype="f2")])
-        grey = context.renderbuffer(self._size, 1, samples=SAMPLES)
-        self._covering = context.framebuffer([grey], context.depth_renderbuffer(self._size, samples=SAMPLES))
-        self._covered = context.framebuffer([context.texture(self._size, 1)])
-        self._bodies = [context.texture(self._size, 4, dtype=kind) for kind in ("f2", "f2", "f2", "f4")]
-        self._body = context.framebuffer(self._bodies, context.depth_renderbuffer(self._size))
+        self._targets: dict[tuple[int, int], _PeopleTargets] = {}
         corners = context.buffer(_uniform([[-1, -1], [3, -1], [-1, 3]]))
         self._screen = context.vertex_array(self._programs["person"], [(corners, "2f", "in_place")])
         small = width // SHADE_SCALE, height // SHADE_SCALE
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
-        self._labels = context.framebuffer([context.texture(self._size, 4)], context.depth_renderbuffer(self._size))
         self._room_shadows, self._people_shadows = ShadowAtlas(context), ShadowAtlas(context)
         self._white = self._texture(np.full((4, 4, 3), 255, np.uint8))
         self._flat = self._texture(np.full((4, 4, 3), (128, 128, 255), np.uint8))
         context.enable(moderngl.DEPTH_TEST)
         context.depth_func = "<="
         self._room: list[_Drawn] = []
+        self._room_depth: list[moderngl.VertexArray] = []
+        self._room_shadow: list[moderngl.VertexArray] = []
         self._people: list[_Drawn] = []
         self._lighting: Lighting | None = None
+        self._people_casting: list[moderngl.VertexArray] = []
         self._jitters = np.random.default_rng(5).integers(0, 300, (12, 2)).astype(float)
 
     def close(self) -> None:
@@ -145,9 +155,12 @@ class Renderer:
             }
             look = self._white if surface.texture is None else self._texture(surface.texture)
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
-            self._room.append(self._drawn(mesh, (look, self._flat, self._white), uniforms, 0, surface.casts_shadow))
+            self._room.append(self._drawn(mesh, (look, self._flat, self._white), uniforms, 0))
+        # Where only its depth counts, the room is one shape: a call for each of its hundred parts takes longer than they do.
+        self._room_depth += self._depth_of([surface.shape for surface in surfaces])
+        self._room_shadow += self._depth_of([surface.shape for surface in surfaces if surface.casts_shadow])
 
-    def add_person(self, look: Look, tints: Tints) -> None:
+    def add_person(self, look: Avatar, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
         maps = self._texture(look.colours), self._texture(look.normal_map), self._texture(look.skin_mask)
         uniforms = {
@@ -157,14 +170,14 @@ class Renderer:
         }
         part = np.where(look.is_eye, EYE, look.part)
         mesh = look.vertices, np.zeros((len(part), 3)), look.texture_coordinates, part, look.triangles
-        person = self._drawn(mesh, maps, uniforms, len(self._people) + 1, True)
-        coarse = coarse_triangles(look.vertices, look.triangles, look.part, SHADOW_CELL_M)
-        index = self._context.buffer(coarse.tobytes())
-        places = [(person.positions, "3f", "in_position")]
-        person.arrays["shadow"] = self._context.vertex_array(self._programs["depth"], places, index)
+        person = self._drawn(mesh, maps, uniforms, len(self._people) + 1)
         self._people.append(person)
+        coarse = coarse_triangles(look.vertices, look.triangles, look.part, SHADOW_CELL_M)
+        places = [(person.positions, "3f", "in_position")]
+        index = self._context.buffer(coarse.tobytes())
+        self._people_casting.append(self._context.vertex_array(self._programs["depth"], places, index))
 
-    def pose(self, meshes: Sequence[Posed]) -> None:
+    def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
         for drawn, mesh in zip(self._people, meshes, strict=True):
             drawn.positions.write(np.ascontiguousarray(mesh.vertices, np.float32).tobytes())
@@ -173,13 +186,12 @@ class Renderer:
     def light(self, lighting: Lighting, centre: Floats) -> None:
         """Set the lamps, and draw the shadows of the room around `centre` (world). After add_room()."""
         self._lighting = lighting
-        casting = [drawn.arrays["shadow"] for drawn in self._room if drawn.casts_shadow]
-        self._room_shadows.draw(self._programs["depth"], lighting.lamps, centre, ROOM_SHADOW_RADIUS_M, casting)
+        program = self._programs["depth"]
+        self._room_shadows.draw(program, lighting.lamps, centre, ROOM_SHADOW_RADIUS_M, self._room_shadow)
 
     def cast_people(self, centre: Floats, radius_m: float) -> None:
         """Draw the shadows of people, as they stand, in a ball around `centre` (world). After light()."""
-        casting = [drawn.arrays["shadow"] for drawn in self._people]
-        self._people_shadows.draw(self._programs["depth"], self._lit().lamps, centre, radius_m, casting)
+        self._people_shadows.draw(self._programs["depth"], self._lit().lamps, centre, radius_m, self._people_casting)
 
     # --- pictures -----------------------------------------------------------------------------------------------------
 
@@ -196,36 +208,40 @@ class Renderer:
         return mean
 
     def people(self, view: View, jitter: int = 0) -> FloatPicture:
-        """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them."""
+        """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them.
+
+        The view may be a window of the picture: the time is that of its pixels.
+        """
         matrix = _view_projection(view)
-        cover = self._cover(matrix)
-        self._draw_bodies(matrix, view)
-        self._resolved.use()
+        targets = self._people_targets(view)
+        cover = self._cover(matrix, targets)
+        self._draw_bodies(matrix, view, targets)
+        targets.lit.use()
         self._context.disable(moderngl.DEPTH_TEST)
-        self._set_light(
-            self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)], self._people_shadows
-        )
+        program, turn = self._programs["person"], self._jitters[jitter % len(self._jitters)]
+        self._set_light(program, matrix, view, turn, self._people_shadows)
         names = "albedo_map", "normal_map", "flat_map", "position_map"
-        for unit, (name, content) in enumerate(zip(names, self._bodies, strict=True)):
+        for unit, (name, content) in enumerate(zip(names, targets.made_of, strict=True)):
             content.use(unit + 4)
-            self._programs["person"][name] = unit + 4
+            program[name] = unit + 4
         self._screen.render()
         self._context.enable(moderngl.DEPTH_TEST)
-        return _edged(self._read(self._resolved), cover)
+        return _edged(self._read(targets.lit), cover)
 
     def labels(self, view: View) -> NDArray[np.uint8]:
         """Per pixel person << 5 | skin << 4 | part (h, w); 0 where there is nobody."""
-        self._labels.use()
-        self._context.viewport = (0, 0, *self._size)
-        self._labels.clear(0.0, 0.0, 0.0, 0.0)
+        target, matrix = self._people_targets(view).labels, _view_projection(view)
+        target.use()
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        self._hide_behind_room(matrix)
         program = self._programs["label"]
-        program["view_projection"].write(_uniform(_view_projection(view).T))
+        program["view_projection"].write(_uniform(matrix.T))
         program["skin_mask"] = 2
-        for drawn in (*self._room, *self._people):
+        for drawn in self._people:
             drawn.maps[2].use(2)
             program["person"] = float(drawn.person)
             drawn.arrays["label"].render()
-        raw = _bytes_of(self._labels, 4)
+        raw = _bytes_of(target, 4)
         part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
         packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
         return np.where(person > 0, packed, 0).astype(np.uint8)
@@ -235,6 +251,7 @@ class Renderer:
     def _pass(self, view: View, kind: str, target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
         program, matrix = self._programs[kind], _view_projection(view)
         target.use()
+        self._context.viewport = (0, 0, *target.size)
         empty = 0.0 if kind == "room" else 1.0
         target.clear(empty, empty, empty, empty)
         self._hide_behind_room(matrix)  # so that what lies behind is not lit in vain
@@ -244,21 +261,27 @@ class Renderer:
             item.arrays[kind].render()
         return self._read(target)[..., :3]
 
-    def _cover(self, matrix: Floats) -> FloatPicture:
+    def _people_targets(self, view: View) -> _PeopleTargets:
+        size = view.width, view.height
+        if size not in self._targets:
+            self._targets[size] = _PeopleTargets.of(self._context, size)
+        self._context.viewport = (0, 0, *size)
+        return self._targets[size]
+
+    def _cover(self, matrix: Floats, targets: _PeopleTargets) -> FloatPicture:
         """Share of each pixel (h, w, 1) that people cover."""
-        self._covering.use()
-        self._context.viewport = (0, 0, *self._size)
-        self._covering.clear(0.0, 0.0, 0.0, 0.0)
+        targets.sampled.use()
+        targets.sampled.clear(0.0, 0.0, 0.0, 0.0)
         self._hide_behind_room(matrix)
         self._programs["cover"]["view_projection"].write(_uniform(matrix.T))
         for item in self._people:
             item.arrays["cover"].render()
-        self._context.copy_framebuffer(self._covered, self._covering)
-        return _bytes_of(self._covered, 1).astype(np.float32) / np.float32(255)
+        self._context.copy_framebuffer(targets.cover, targets.sampled)
+        return _bytes_of(targets.cover, 1).astype(np.float32) / np.float32(255)
 
-    def _draw_bodies(self, matrix: Floats, view: View) -> None:
-        self._body.use()
-        self._body.clear(0.0, 0.0, 0.0, 0.0)
+    def _draw_bodies(self, matrix: Floats, view: View, targets: _PeopleTargets) -> None:
+        targets.body.use()
+        targets.body.clear(0.0, 0.0, 0.0, 0.0)
         self._hide_behind_room(matrix)
         program = self._programs["body"]
         program["view_projection"].write(_uniform(matrix.T))
@@ -269,8 +292,17 @@ class Renderer:
 
     def _hide_behind_room(self, matrix: Floats) -> None:
         self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
-        for item in self._room:
-            item.arrays["depth"].render()
+        for shape in self._room_depth:
+            shape.render()
+
+    def _depth_of(self, shapes: Sequence[Shape]) -> list[moderngl.VertexArray]:
+        """The shapes as one, for their depth alone; none where there are none."""
+        if not shapes:
+            return []
+        whole = joined(shapes)
+        at = self._context.buffer(_uniform(whole.vertices))
+        index = self._context.buffer(np.ascontiguousarray(whole.triangles, np.int32).tobytes())
+        return [self._context.vertex_array(self._programs["depth"], [(at, "3f", "in_position")], index)]
 
     def _set_look(self, program: Any, item: _Drawn) -> None:
         for unit, (name, look) in enumerate(zip(("albedo_map", "normal_map", "skin_mask"), item.maps, strict=True)):
@@ -324,7 +356,6 @@ class Renderer:
         maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture],
         uniforms: dict[str, Any],
         person: int,
-        casts_shadow: bool,
     ) -> _Drawn:
         positions, normals, coordinates, part, triangles = mesh
         buffer = self._context.buffer
@@ -334,14 +365,12 @@ class Renderer:
         index = buffer(np.ascontiguousarray(triangles, np.int32).tobytes())
         places = [(at, "3f", "in_position")]
         whole = [*places, (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
-        wanted = {"label": whole, "depth": places}
-        wanted |= {"body": whole, "cover": places} if person else {"room": whole, "shade": whole}
+        wanted = {"body": whole, "cover": places, "label": whole} if person else {"room": whole, "shade": whole}
         arrays = {
             name: self._context.vertex_array(self._programs[name], content, index, skip_errors=True)
             for name, content in wanted.items()
         }
-        arrays["shadow"] = arrays["depth"]
-        return _Drawn(at, up, arrays, maps, uniforms, person, casts_shadow)
+        return _Drawn(at, up, arrays, maps, uniforms, person)
 
     def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
         content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])

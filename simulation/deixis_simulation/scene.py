@@ -24,10 +24,12 @@ ArmSide = Literal["left", "right"]
 ArmStyle = Literal["straight", "bent", "hip"]
 HandShape = Literal["index", "flat"]
 QuietGesture = Literal[
-    "wave", "stop", "thumb", "scratch", "phone", "beats", "drink", "hips", "crossed", "chin", "hair", "glasses", "carry", "facepass"
+    "wave", "stop", "thumb", "scratch", "phone", "beats", "drink",
+    "hips", "crossed", "chin", "hair", "glasses", "carry", "facepass",
 ]  # fmt: skip
 QUIET_GESTURES: tuple[QuietGesture, ...] = (
-    "wave", "stop", "thumb", "scratch", "phone", "beats", "drink", "hips", "crossed", "chin", "hair", "glasses", "carry", "facepass",
+    "wave", "stop", "thumb", "scratch", "phone", "beats", "drink",
+    "hips", "crossed", "chin", "hair", "glasses", "carry", "facepass",
 )  # fmt: skip
 WallKind = Literal["plaster", "brick", "wood", "panel"]
 FloorKind = Literal["wood", "stone", "carpet"]

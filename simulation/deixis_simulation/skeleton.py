@@ -17,6 +17,8 @@ from .scene import ArmSide
 SIDES: tuple[ArmSide, ...] = ("right", "left")
 _SPINE_SHARE = {"Spine": 0.25, "Spine1": 0.6, "Spine2": 1.0}
 _LEGS_FOLLOW_HIPS = 0.5
+_TOES_BEND_DEG = 35.0
+"""Toes lie on the floor until the heel is that far up."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,11 @@ class Leg:
     swing_deg: float = 0.0
     knee_deg: float = 0.0
     ankle_deg: float = 0.0
+
+    @property
+    def foot_up_deg(self) -> float:
+        """Pitch of the foot against the floor; negative: the heel is up."""
+        return self.swing_deg - self.knee_deg + self.ankle_deg
 
 
 @dataclass
@@ -96,7 +103,7 @@ class Skeleton:
 def solve(body: Body, posture: Posture) -> Skeleton:
     """The skeleton in the person's frame."""
     turns = {"Hips": posture.hips_turn, **_spine(posture), **_head(posture)}
-    turns.update(_moving_legs(posture) if posture.legs else _standing_legs(body, posture))
+    turns.update(_moving_legs(body, posture) if posture.legs else _standing_legs(body, posture))
     for side in SIDES:
         turns.update(_arm(body, side, posture.arms[side], turns["Spine2"]))
     return _place(body, turns, posture.offset)
@@ -119,21 +126,29 @@ def _head(posture: Posture) -> dict[str, Floats]:
 def _standing_legs(body: Body, posture: Posture) -> dict[str, Floats]:
     """Legs that lean so that the feet stay where they are while the hips sway."""
     yaw = about(UP, posture.hips[0] * _LEGS_FOLLOW_HIPS)
-    x, _, z = posture.offset
-    lean = swing((0.0, -1.0, 0.0), (-x, -body.joint("RightUpLeg")[1], -z))
+    lean = _lean(body, posture)
     turns = {}
     for prefix in BONE_PREFIX.values():
         turns.update({f"{prefix}UpLeg": lean @ yaw, f"{prefix}Foot": yaw})
     return turns
 
 
-def _moving_legs(posture: Posture) -> dict[str, Floats]:
+def _lean(body: Body, posture: Posture) -> Floats:
+    x, _, z = posture.offset
+    return swing((0.0, -1.0, 0.0), (-x, -body.joint("RightUpLeg")[1], -z))
+
+
+def _moving_legs(body: Body, posture: Posture) -> dict[str, Floats]:
+    lean = _lean(body, posture)
     turns = {}
     for side, leg in (posture.legs or {}).items():
-        thigh = about(UP, posture.hips[0] * _LEGS_FOLLOW_HIPS) @ about(RIGHT, -leg.swing_deg)
+        thigh = lean @ about(UP, posture.hips[0] * _LEGS_FOLLOW_HIPS) @ about(RIGHT, -leg.swing_deg)
         shank = thigh @ about(RIGHT, leg.knee_deg)
+        foot = shank @ about(RIGHT, -leg.ankle_deg)
+        toes = foot @ about(RIGHT, -min(max(-leg.foot_up_deg, 0.0), _TOES_BEND_DEG))
         prefix = BONE_PREFIX[side]
-        turns.update({f"{prefix}UpLeg": thigh, f"{prefix}Leg": shank, f"{prefix}Foot": shank @ about(RIGHT, -leg.ankle_deg)})
+        bones = (("UpLeg", thigh), ("Leg", shank), ("Foot", foot), ("ToeBase", toes))
+        turns.update({prefix + bone: rotation for bone, rotation in bones})
     return turns
 
 

@@ -27,6 +27,11 @@ def enough_trunk_deg(trunk_deg: float, head_deg: float) -> float:
     return min(max(min(max(trunk_deg, least), most), -TRUNK_DEG), TRUNK_DEG)
 
 
+def reachable_deg(head_deg: float, trunk_deg: float) -> float:
+    """The head's azimuth nearest to `head_deg` that the neck reaches from a chest that looks at `trunk_deg`."""
+    return trunk_deg + _clip(wrap_deg(head_deg - trunk_deg), NECK_DEG)
+
+
 @dataclass(frozen=True)
 class Look:
     """Where head and eyes go: head yaw, pitch up, roll; eyes in the head yaw, pitch up."""

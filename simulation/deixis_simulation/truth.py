@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .actor import Moment
 from .avatars import Avatar
-from .geometry import Floats, RobotState, View, to_world, wrap_deg
+from .geometry import RobotState, View, to_world, wrap_deg
 from .label_image import Labels, face_mask, hand_mask, region_of
 from .scene import ArmSide, Scene
 from .truth_arm import arm_truth, hand_truth
@@ -26,7 +27,7 @@ class Seen:
 
     avatar: Avatar
     moment: Moment
-    vertices: Floats
+    vertices: NDArray[np.float32]
 
 
 class TruthWriter:
@@ -62,8 +63,8 @@ class TruthWriter:
             **self._target(moment, toward),
             "head": head_truth(moment.head_rotation, moment.head_centre, moment.eyes, view),
             "face": face_truth(
-                seen.vertices[avatar.face_vertices],
-                seen.vertices[avatar.head_vertices],
+                np.asarray(seen.vertices[avatar.face_vertices], float),
+                np.asarray(seen.vertices[avatar.head_vertices], float),
                 region_of(face_mask(labels, index)),
                 view,
             ),

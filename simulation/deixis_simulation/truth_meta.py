@@ -17,15 +17,15 @@ from .truth_camera import camera_truth, labels_origin
 DRAWN_NAME = re.compile(r"s(\d+)_(\d+)_[a-z]+")
 """Of scenes drawn at random: seed and index."""
 CONVENTIONS = (
-    "azimuth/yaw: at the person, from the direction person -> camera, + toward image right (the person's own left). pitch + up, "
-    "roll + head top to image right. head.yaw/pitch/roll: camera axes (R_cam, basis x_cam, -y_cam, -z_cam, identity = frontal); "
-    "yaw_rel_deg: to the line head -> camera. World: X image right at the start, Y up, Z from the first person's start toward the "
-    "robot; map x = x_ref_m - Z, map y = -X. robot_xy: x forward, y left from the camera's foot at that frame. frames[].camera "
-    "and .robot (map) stand where the robot moves."
+    "azimuth/yaw: at the person, from the direction person -> camera, + toward image right (the person's own left). "
+    "pitch + up, roll + head top to image right. head.yaw/pitch/roll: camera axes (R_cam, basis x_cam, -y_cam, -z_cam, "
+    "identity = frontal); yaw_rel_deg: to the line head -> camera. World: X image right at the start, Y up, Z from the first "
+    "person's start toward the robot; map x = x_ref_m - Z, map y = -X. robot_xy: x forward, y left from the camera's foot at "
+    "that frame. frames[].camera and .robot (map) stand where the robot moves."
 )
 LABEL_BITS = (
-    "labels.npz: per frame fNNNN a PNG; person << 5 | skin << 4 | part; part 1 head 2 neck 3 right hand 4 left hand 5 right arm "
-    "6 left arm 7 other; 0 background"
+    "labels.npz: per frame fNNNN a PNG; person << 5 | skin << 4 | part; part 1 head 2 neck 3 right hand 4 left hand "
+    "5 right arm 6 left arm 7 other; 0 background"
 )
 
 

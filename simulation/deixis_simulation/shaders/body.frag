@@ -25,11 +25,13 @@ void main() {
   vec3 flat_normal = normalize(normal);
   bool hand = part > 2.5 && part < 4.5;
   bool eye = part > 90.0;
-  float skin = texture(skin_mask, coordinate).r;
+  float skin_texel = texture(skin_mask, coordinate).r;
+  float skin = skin_texel;
   if (hand) skin = max(skin, 0.9);
   if (part > 6.5) skin = 0.0;
   vec3 other = part < 1.5 ? hair_tint : clothes_tint;
-  albedo *= eye ? vec3(0.8) : mix(other, skin_tint, skin);
+  // Bare legs have the tint of skin, though they shine like cloth: the mask takes some cloth for skin.
+  albedo *= eye ? vec3(0.8) : mix(other, skin_tint, max(skin, skin_texel));
   if (dot(flat_normal, camera - position) < 0.0) flat_normal = -flat_normal;
   // Tangents from screen-space derivatives: the packed avatars carry none.
   vec3 dpx = dFdx(position), dpy = dFdy(position);
