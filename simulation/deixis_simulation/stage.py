@@ -108,7 +108,7 @@ class Stage:
         if same and self._view is not None and np.allclose(self._view.translation, view.translation, atol=1e-9):
             return
         self._view = view
-        self._room = self._renderer.room(view, 1 if self._moves else 6)
+        self._room = self._renderer.room_at_once(view) if self._moves else self._renderer.room(view)
         self._shaded = self._room
         self._shadowed = []
 
