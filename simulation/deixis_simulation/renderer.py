@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .avatars import Avatar
 from .geometry import Floats, View
 from .lights import MAX_LAMPS, Lighting
+from .shadows import ShadowAtlas, coarse_triangles
 from .shapes import Shape, joined
 from .skinning import Mesh
 from .surface import Surface
@@ -26,10 +27,17 @@ TILES = 4
 SAMPLES = 4
 NEAR_M, FAR_M = 0.05, 40.0
 BRIGHTEST = 30.0
-SHADOW_RADIUS_M = 1.3
-"""Around the middle of the people: what casts shadows; the rest of the room lies in the light."""
+ROOM_SHADOW_RADIUS_M = 3.5
+"""Around the middle of the lamps: where furniture and exhibits cast shadows."""
+SHADOW_CELL_M = 0.012
+"""Details of people that are smaller cast no shadow."""
+EYE = 99
+"""Stands for the part of the body where it is an eye; the shaders know it as more than 90."""
 ROOM_PASSES = 6
-"""Passes with other jitter that are averaged for a room that is rendered once."""
+"""Passes, each shifted within a pixel, that are averaged for a room that is rendered once: cheaper than samples in each."""
+GOLDEN = 0.618034
+EDGE_FROM = 0.1
+"""Difference among neighbours, of the square root of light, from which on they are an edge."""
 SHADE_SCALE = 4
 """Shadows of people on the room are soft: they are rendered at a quarter of the size."""
 
@@ -53,10 +61,8 @@ class _Drawn:
 
     positions: moderngl.Buffer
     normals: moderngl.Buffer
-    seen: moderngl.VertexArray
-    depth: moderngl.VertexArray
-    cover: moderngl.VertexArray
-    label: moderngl.VertexArray
+    arrays: dict[str, moderngl.VertexArray]
+    """By the name of the program."""
     maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]
     uniforms: dict[str, Any]
     person: int
@@ -114,18 +120,13 @@ class Renderer:
             "depth": self._program("depth.vert", "depth.frag"),
             "label": self._program("surface.vert", "label.frag"),
         }
-        colour = context.renderbuffer(self._size, 4, samples=SAMPLES, dtype="f2")
-        self._sampled = context.framebuffer([colour], context.depth_renderbuffer(self._size, samples=SAMPLES))
-        self._resolved = context.framebuffer([context.texture(self._size, 4, dtype="f2")])
+        self._whole = context.framebuffer([context.texture(self._size, 4, dtype="f2")], context.depth_renderbuffer(self._size))
         self._targets: dict[tuple[int, int], _PeopleTargets] = {}
         corners = context.buffer(_uniform([[-1, -1], [3, -1], [-1, 3]]))
         self._screen = context.vertex_array(self._programs["person"], [(corners, "2f", "in_place")])
         small = width // SHADE_SCALE, height // SHADE_SCALE
         self._small = context.framebuffer([context.texture(small, 4, dtype="f2")], context.depth_renderbuffer(small))
-        atlas = context.depth_texture((SHADOW_TILE_PX * TILES, SHADOW_TILE_PX * TILES))
-        atlas.compare_func, atlas.filter = "<=", (moderngl.LINEAR, moderngl.LINEAR)
-        atlas.repeat_x = atlas.repeat_y = False
-        self._atlas, self._shadows = atlas, context.framebuffer(depth_attachment=atlas)
+        self._room_shadows, self._people_shadows = ShadowAtlas(context), ShadowAtlas(context)
         self._white = self._texture(np.full((4, 4, 3), 255, np.uint8))
         self._flat = self._texture(np.full((4, 4, 3), (128, 128, 255), np.uint8))
         context.enable(moderngl.DEPTH_TEST)
@@ -135,7 +136,7 @@ class Renderer:
         self._room_shadow: list[moderngl.VertexArray] = []
         self._people: list[_Drawn] = []
         self._lighting: Lighting | None = None
-        self._matrices: list[Floats] = []
+        self._people_casting: list[moderngl.VertexArray] = []
         self._jitters = np.random.default_rng(5).integers(0, 300, (12, 2)).astype(float)
 
     def close(self) -> None:
@@ -156,7 +157,7 @@ class Renderer:
             }
             look = self._white if surface.texture is None else self._texture(surface.texture)
             mesh = shape.vertices, shape.normals, shape.texture_coordinates, np.zeros(len(shape.vertices)), shape.triangles
-            self._room.append(self._drawn("room", mesh, (look, self._flat, self._white), uniforms, 0))
+            self._room.append(self._drawn(mesh, (look, self._flat, self._white), uniforms, 0))
         # Where only its depth counts, the room is one shape: a call for each of its hundred parts takes longer than they do.
         self._room_depth += self._depth_of([surface.shape for surface in surfaces])
         self._room_shadow += self._depth_of([surface.shape for surface in surfaces if surface.casts_shadow])
@@ -169,9 +170,14 @@ class Renderer:
             "hair_tint": tuple(tints.hair),
             "clothes_tint": tuple(tints.clothes),
         }
-        empty = np.zeros((len(look.part), 3))
-        mesh = empty, empty, look.texture_coordinates, look.part, look.triangles
-        self._people.append(self._drawn("body", mesh, maps, uniforms, len(self._people) + 1))
+        part = np.where(look.is_eye, EYE, look.part)
+        mesh = look.vertices, np.zeros((len(part), 3)), look.texture_coordinates, part, look.triangles
+        person = self._drawn(mesh, maps, uniforms, len(self._people) + 1)
+        self._people.append(person)
+        coarse = coarse_triangles(look.vertices, look.triangles, look.part, SHADOW_CELL_M)
+        places = [(person.positions, "3f", "in_position")]
+        index = self._context.buffer(coarse.tobytes())
+        self._people_casting.append(self._context.vertex_array(self._programs["depth"], places, index))
 
     def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
@@ -182,25 +188,25 @@ class Renderer:
     def light(self, lighting: Lighting, centre: Floats, *, people: bool = True) -> None:
         """Set the lamps, and draw their shadow maps around `centre` (world); `people` False: of the room alone."""
         self._lighting = lighting
-        self._shadows.use()
-        self._shadows.clear(depth=1.0)
         program = self._programs["depth"]
-        self._matrices = [_lamp_matrix(lamp.position, centre) for lamp in lighting.lamps]
-        casting = [*self._room_shadow, *(drawn.depth for drawn in self._people if people)]
-        for number, matrix in enumerate(self._matrices):
-            column, row = number % TILES, number // TILES
-            self._context.viewport = (column * SHADOW_TILE_PX, row * SHADOW_TILE_PX, SHADOW_TILE_PX, SHADOW_TILE_PX)
-            program["view_projection"].write(_uniform(matrix.T))
-            for shape in casting:
-                shape.render()
+        self._room_shadows.draw(program, lighting.lamps, centre, ROOM_SHADOW_RADIUS_M, self._room_shadow)
+
+    def cast_people(self, centre: Floats, radius_m: float) -> None:
+        """Draw the shadows of people, as they stand, in a ball around `centre` (world). After light()."""
+        self._people_shadows.draw(self._programs["depth"], self._lit().lamps, centre, radius_m, self._people_casting)
 
     # --- pictures -----------------------------------------------------------------------------------------------------
 
-    def room(self, view: View, passes: int = ROOM_PASSES) -> FloatPicture:
-        """The room without people (h, w, 3), linear; light() decides whose shadows fall into it."""
-        pictures = [self._pass(view, self._room, self._sampled, jitter)[..., :3] for jitter in self._jitters[:passes]]
+    def room(self, view: View) -> FloatPicture:
+        """The room without people and their shadows (h, w, 3), linear, smooth at edges: for a camera that stands."""
+        passes = zip(_shifts(ROOM_PASSES), self._jitters, strict=False)
+        pictures = [self._pass(_shifted(view, shift), "room", self._whole, jitter) for shift, jitter in passes]
         mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
         return mean
+
+    def room_at_once(self, view: View) -> FloatPicture:
+        """As room(), in one pass, with edges softened afterwards: for a camera that moves."""
+        return _softened(self._pass(view, "room", self._whole, self._jitters[0]))
 
     def shade(self, view: View) -> FloatPicture:
         """The room at a quarter of the size, without people; one with and one without their shadows give the shadows."""
@@ -219,11 +225,12 @@ class Renderer:
         self._draw_bodies(matrix, view, targets)
         targets.lit.use()
         self._context.disable(moderngl.DEPTH_TEST)
-        self._set_light(self._programs["person"], matrix, view, self._jitters[jitter % len(self._jitters)])
+        program, turn = self._programs["person"], self._jitters[jitter % len(self._jitters)]
+        self._set_light(program, matrix, view, turn, self._people_shadows)
         names = "albedo_map", "normal_map", "flat_map", "position_map"
         for unit, (name, content) in enumerate(zip(names, targets.made_of, strict=True)):
             content.use(unit + 4)
-            self._programs["person"][name] = unit + 4
+            program[name] = unit + 4
         self._screen.render()
         self._context.enable(moderngl.DEPTH_TEST)
         return _edged(self._read(targets.lit), cover)
@@ -240,7 +247,7 @@ class Renderer:
         for drawn in self._people:
             drawn.maps[2].use(2)
             program["person"] = float(drawn.person)
-            drawn.label.render()
+            drawn.arrays["label"].render()
         raw = _bytes_of(target, 4)
         part, person, skin = raw[..., 0], raw[..., 1], raw[..., 2] > 127
         packed = (np.maximum(person, 1) - 1) << 5 | skin.astype(np.uint8) << 4 | np.minimum(part, 15)
@@ -252,9 +259,11 @@ class Renderer:
         program = self._programs["room"]
         target.use()
         self._context.viewport = (0, 0, *target.size)
-        target.clear(0.0, 0.0, 0.0, 0.0)
-        self._set_light(program, _view_projection(view), view, jitter)
-        for item in drawn:
+        empty = 0.0 if kind == "room" else 1.0
+        target.clear(empty, empty, empty, empty)
+        self._hide_behind_room(matrix)  # so that what lies behind is not lit in vain
+        self._set_light(program, matrix, view, jitter, self._room_shadows if kind == "room" else self._people_shadows)
+        for item in self._room:
             self._set_look(program, item)
             item.seen.render()
         return self._read(target)
@@ -273,7 +282,7 @@ class Renderer:
         self._hide_behind_room(matrix)
         self._programs["cover"]["view_projection"].write(_uniform(matrix.T))
         for item in self._people:
-            item.cover.render()
+            item.arrays["cover"].render()
         self._context.copy_framebuffer(targets.cover, targets.sampled)
         return _bytes_of(targets.cover, 1).astype(np.float32) / np.float32(255)
 
@@ -312,9 +321,6 @@ class Renderer:
                 program[key] = value
 
     def _read(self, target: moderngl.Framebuffer) -> FloatPicture:
-        if target is self._sampled:
-            self._context.copy_framebuffer(self._resolved, self._sampled)
-            target = self._resolved
         width, height = target.size
         raw = np.frombuffer(target.read(components=4, dtype="f2"), np.float16).reshape(height, width, 4)[::-1]
         return np.clip(np.nan_to_num(raw.astype(np.float32), posinf=BRIGHTEST), 0, BRIGHTEST)
@@ -363,8 +369,13 @@ class Renderer:
             return self._context.vertex_array(self._programs[program], content, index, skip_errors=True)
 
         places = [(at, "3f", "in_position")]
-        depth, cover = array("depth", places), array("cover", places)
-        return _Drawn(at, up, array(kind, whole), depth, cover, array("label", whole), maps, uniforms, person)
+        whole = [*places, (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
+        wanted = {"body": whole, "cover": places, "label": whole} if person else {"room": whole, "shade": whole}
+        arrays = {
+            name: self._context.vertex_array(self._programs[name], content, index, skip_errors=True)
+            for name, content in wanted.items()
+        }
+        return _Drawn(at, up, arrays, maps, uniforms, person)
 
     def _texture(self, picture: NDArray[np.uint8]) -> moderngl.Texture:
         content = np.ascontiguousarray(picture if picture.ndim == 3 else picture[..., None])
@@ -399,9 +410,33 @@ def _edged(light: FloatPicture, cover: FloatPicture) -> FloatPicture:
     return np.concatenate([filled * cover, cover], axis=2)
 
 
-def shadows_on(room: FloatPicture, plain: FloatPicture, shaded: FloatPicture) -> FloatPicture:
-    """The room with people's shadows: (h, w, 3) darkened by what two small pictures, without and with people, differ."""
-    share = np.clip((shaded + 0.003) / (plain + 0.003), 0, 1.03)
+def _shifts(count: int) -> Floats:
+    """Offsets (count, 2) within a pixel, evenly spread, mean 0."""
+    number = np.arange(count)
+    return np.stack([(number + 0.5) / count, (number * GOLDEN + 0.5 / count) % 1.0], axis=1) - _middle(count)
+
+
+def _middle(count: int) -> Floats:
+    return np.array((0.5, float(np.mean((np.arange(count) * GOLDEN + 0.5 / count) % 1.0))))
+
+
+def _shifted(view: View, shift_px: Floats) -> View:
+    matrix = view.matrix.copy()
+    matrix[:2, 2] += shift_px
+    return replace(view, matrix=matrix)
+
+
+def _softened(light: FloatPicture) -> FloatPicture:
+    """Light (h, w, 3) whose stair-stepped edges are blurred a little; even surfaces stay as they are."""
+    grey = np.sqrt(light @ np.array((0.21, 0.72, 0.07), np.float32))
+    box = np.ones((3, 3), np.uint8)
+    contrast = cv2.dilate(grey, box) - cv2.erode(grey, box)
+    share = np.clip((contrast - EDGE_FROM) / EDGE_FROM, 0, 1)[..., None]
+    return (light + share * (cv2.GaussianBlur(light, (3, 3), 0.7) - light)).astype(np.float32)
+
+
+def shadows_on(room: FloatPicture, share: FloatPicture) -> FloatPicture:
+    """The room (h, w, 3) with people's shadows, of which `share` (h / 4, w / 4, 3) is left; see Renderer.shade."""
     height, width = room.shape[:2]
     soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_CUBIC)
     return (room * soft).astype(np.float32)

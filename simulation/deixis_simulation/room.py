@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from . import textures
 from .exhibits import build_exhibit
 from .furniture import build_furniture
 from .geometry import Floats, robot_at, to_world, view_at
-from .scene import Room, Scene, ScenePoi, Tone
+from .scene import Person, Place, Room, Scene, ScenePoi, Tone, Walk
 from .shapes import box, quad
 from .surface import Surface
 
@@ -19,6 +20,8 @@ Rng = np.random.Generator
 
 TOO_NEAR_CAMERA_M = 0.9
 WALL_THICKNESS_M = 0.08
+LEG_STEPS = 5
+"""Places of the camera that are looked at between two waypoints, and one more."""
 
 
 def build_room(scene: Scene) -> list[Surface]:
@@ -34,16 +37,32 @@ def build_room(scene: Scene) -> list[Surface]:
 
 
 def is_drawn(poi: ScenePoi, scene: Scene) -> bool:
-    """Whether the POI's exhibit is drawn: it must stand in the room, and neither at the lens nor before a person."""
+    """Whether the POI's exhibit is drawn: it must stand in the room, and neither at the lens nor before a person.
+
+    The lens is looked at wherever the robot goes, people where they come to stand; who walks may pass behind an exhibit.
+    """
     room, (x, y, _) = scene.room, poi.position_m
     inside = room.back_x_m < x < room.front_x_m - 0.2 and room.right_y_m + 0.2 < y < room.left_y_m - 0.2
     if poi.exhibit is None or not inside:
         return False
-    camera = view_at(scene.camera, robot_at(scene.robot_path, 0.0)).centre
     place = to_world((x, y, 0.0))
-    if math.hypot(place[0] - camera[0], place[2] - camera[2]) < TOO_NEAR_CAMERA_M:
+    cameras = _camera_places(scene)
+    if any(math.hypot(place[0] - camera[0], place[2] - camera[2]) < TOO_NEAR_CAMERA_M for camera in cameras):
         return False
-    return not any(_stands_before(place, to_world((*person.place_m, 0.0)), camera) for person in scene.people)
+    people = [to_world(stand) for person in scene.people for stand in _standing_places(person)]
+    return not any(_stands_before(place, person, camera) for person in people for camera in cameras)
+
+
+def _camera_places(scene: Scene) -> list[Floats]:
+    """Where the lens is (world), leg by leg of the robot's path."""
+    path = scene.robot_path
+    times = [point.at_s for point in path] or [0.0]
+    between = [a + (b - a) * step / LEG_STEPS for a, b in pairwise(times) for step in range(1, LEG_STEPS)]
+    return [view_at(scene.camera, robot_at(path, time_s)).centre for time_s in (*times, *between)]
+
+
+def _standing_places(person: Person) -> list[Place]:
+    return [person.place_m, *(action.to_m for action in person.actions if isinstance(action, Walk))]
 
 
 def _stands_before(place: Floats, person: Floats, camera: Floats) -> bool:

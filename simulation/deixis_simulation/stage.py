@@ -61,7 +61,6 @@ class Stage:
         self._moves = len(scene.robot_path) > 1
         self._view: View | None = None
         self._room: FloatPicture
-        self._plain: FloatPicture
         self._shaded: FloatPicture
         self._shadowed: list[NDArray[np.float32]] = []
 
@@ -76,7 +75,7 @@ class Stage:
         self._look_at(view, centre)
         if not self._scene.people:
             return self._room.copy()
-        self._cast_shadows(view, middle, centre)
+        self._cast_shadows(view, subframes[len(subframes) // 2])
         picture = self._shaded.copy()
         window = window_of([mesh for meshes in subframes for mesh in meshes], view)
         if window is None:
@@ -101,22 +100,14 @@ class Stage:
             labels[top : top + height, left : left + width] = self._renderer.labels(view.part(*window))
         return labels
 
-    def _centre(self, meshes: Sequence[Mesh]) -> Floats:
-        if not meshes:
-            return np.array((0.0, SHADOW_CENTRE_M, -2.0))
-        middles = [0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)) for mesh in meshes]
-        x, _, z = np.mean(middles, axis=0)
-        return np.array((float(x), SHADOW_CENTRE_M, float(z)))
-
-    def _look_at(self, view: View, centre: Floats) -> None:
+    def _look_at(self, view: View) -> None:
         """Render the room without people's shadows, where the camera is at a new place."""
         same = self._view is not None and np.allclose(self._view.rotation, view.rotation, atol=1e-9)
         if same and self._view is not None and np.allclose(self._view.translation, view.translation, atol=1e-9):
             return
         self._view = view
-        self._renderer.light(lighting(self._scene.light, self._lamps_around()), centre, people=False)
-        self._room = self._renderer.room(view, 1 if self._moves else 6)
-        self._plain, self._shaded = self._renderer.shade(view), self._room
+        self._room = self._renderer.room_at_once(view) if self._moves else self._renderer.room(view)
+        self._shaded = self._room
         self._shadowed = []
 
     def _lamps_around(self) -> Floats:
@@ -127,7 +118,7 @@ class Stage:
         x, y = places.mean(axis=0)
         return np.array((-y, 0.0, -x))
 
-    def _cast_shadows(self, view: View, meshes: Sequence[Mesh], centre: Floats) -> None:
+    def _cast_shadows(self, view: View, meshes: Sequence[Mesh]) -> None:
         now = [mesh.vertices[::97] for mesh in meshes]
         if self._shadowed and all(
             float(np.abs(a - b).max()) < SHADOWS_STAND_M for a, b in zip(now, self._shadowed, strict=True)
@@ -135,5 +126,14 @@ class Stage:
             return
         self._shadowed = [np.array(vertices) for vertices in now]
         self._renderer.pose(meshes)
-        self._renderer.light(lighting(self._scene.light, self._lamps_around()), centre)
-        self._shaded = shadows_on(self._room, self._plain, self._renderer.shade(view))
+        self._renderer.cast_people(*_ball(meshes))
+        self._shaded = shadows_on(self._room, self._renderer.shade(view))
+
+
+def _ball(meshes: Sequence[Mesh]) -> tuple[Floats, float]:
+    """Centre (world) and radius, metres, of a ball around the people."""
+    middles = np.array([0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)) for mesh in meshes], float)
+    low, high = middles.min(0), middles.max(0)
+    centre = 0.5 * (low + high)
+    apart = float(np.hypot(*(high - low)[[0, 2]])) / 2
+    return np.array((centre[0], SHADOW_CENTRE_M, centre[2])), min(PERSON_RADIUS_M + apart, WIDEST_RADIUS_M)

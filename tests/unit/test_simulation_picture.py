@@ -27,6 +27,7 @@ from deixis_simulation.scene import (
     Scene,
     ScenePoi,
     Sensor,
+    Walk,
     Waypoint,
 )
 from deixis_simulation.sensor import SensorModel
@@ -158,6 +159,15 @@ def test_a_texture_is_the_same_for_the_same_seed():
 def test_an_exhibit_is_drawn_in_the_room_and_not_before_a_person_or_at_the_lens(place, drawn):
     poi = ScenePoi(poi_id="a", position_m=place, exhibit="vase")
     assert is_drawn(poi, scene(pois=[poi], people=[PERSON])) is drawn
+
+
+def test_an_exhibit_is_not_drawn_where_the_robot_will_drive_or_before_who_will_stand_there():
+    poi = ScenePoi(poi_id="a", position_m=(2.0, 1.0, 1.2), exhibit="vase")
+    assert is_drawn(poi, scene(pois=[poi]))
+    path = [Waypoint(at_s=0), Waypoint(at_s=4, x_m=4.0, y_m=2.0)]
+    assert not is_drawn(poi, scene(pois=[poi], robot_path=path)), "the way leads through it"
+    walker = Person(avatar="box", place_m=(2.0, -2.0), actions=[Walk(start_s=0, to_m=(3.0, 1.5))])
+    assert not is_drawn(poi, scene(pois=[poi], people=[walker]))
 
 
 def test_light_goes_where_a_change_says_and_flicker_takes_from_it():

@@ -30,6 +30,12 @@ float lit(int lamp, vec4 at, vec2 turn, float taps) {
   if (taps > 1.5) {
     first = 0.5 * (first + texture(shadow_map, vec3(tile + clamp(place.xy - offset * 0.7, 0.01, 0.99) * 0.25, depth)));
   }
+  if (taps > 3.5) {  // across as well: on people, rendered once, the turning of two taps shows as a pattern
+    vec2 across = vec2(-offset.y, offset.x) * 0.85;
+    float third = texture(shadow_map, vec3(tile + clamp(place.xy + across, 0.01, 0.99) * 0.25, depth));
+    float fourth = texture(shadow_map, vec3(tile + clamp(place.xy - across, 0.01, 0.99) * 0.25, depth));
+    first = 0.5 * first + 0.25 * (third + fourth);
+  }
   return mix(first, 1.0, fading);
 }
 
@@ -40,8 +46,8 @@ vec3 ambient(vec3 n) { return mix(ambient_down, ambient_up, n.y * 0.5 + 0.5); }
 // What is left of the ambient light where `seen` of the lamps' lights fall.
 float occlusion(float seen) { return 0.35 + 0.65 * seen / float(max(lamps, 1)); }
 
-// Light from `position` to the camera; n is the bumped normal, flat_normal that of the mesh; skin is 0 to 1.
-vec3 shade(vec3 position, vec3 n, vec3 flat_normal, vec3 albedo, float skin, float roughness, float gloss) {
+// Light from `position` to the camera; n is the bumped normal, flat_normal that of the mesh; skin is 0 to 1; taps: 2 or 4 a key lamp.
+vec3 shade(vec3 position, vec3 n, vec3 flat_normal, vec3 albedo, float skin, float roughness, float gloss, float taps) {
   vec3 to_camera = normalize(camera - position);
   float angle = noise(gl_FragCoord.xy + jitter) * 6.2831853;
   vec2 turn = vec2(cos(angle), sin(angle));
@@ -60,7 +66,7 @@ vec3 shade(vec3 position, vec3 n, vec3 flat_normal, vec3 albedo, float skin, flo
     float d2 = dot(l, l);
     l *= inversesqrt(d2);
     bool key = i < key_lamps;
-    float s = lit(i, raised, turn, key ? 2.0 : 1.0);
+    float s = lit(i, raised, turn, key ? taps : 0.5 * taps);
     seen += s;
     vec3 light = lamp_colour[i] * (key ? reach(i, d2) : 1.0);
     float nl = dot(n, l);

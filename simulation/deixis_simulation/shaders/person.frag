@@ -18,6 +18,6 @@ void main() {
   float skin = eye ? 0.0 : albedo.w;
   float roughness = eye ? 0.12 : mix(0.75, 0.47, skin);
   float gloss = eye ? 1.6 : mix(0.25, 0.8, skin);
-  vec3 sum = shade(position.xyz, n.xyz, texelFetch(flat_map, at, 0).xyz, albedo.rgb, skin, roughness, gloss);
+  vec3 sum = shade(position.xyz, n.xyz, texelFetch(flat_map, at, 0).xyz, albedo.rgb, skin, roughness, gloss, 4.0);
   colour = vec4(clamp(sum, vec3(0.0), vec3(60.0)), 1.0);
 }

@@ -19,6 +19,6 @@ vec3 linear(vec3 c) { return c * (c * (c * 0.3053 + 0.6822) + 0.0125); }
 void main() {
   vec3 albedo = linear(texture(albedo_map, coordinate).rgb) * tint;
   vec3 n = normalize(normal);
-  vec3 sum = shade(position, n, n, albedo, 0.0, roughness_of_surface, gloss_of_surface) + emission;
+  vec3 sum = shade(position, n, n, albedo, 0.0, roughness_of_surface, gloss_of_surface, 2.0) + emission;
   colour = vec4(clamp(sum, vec3(0.0), vec3(60.0)), 1.0);
 }
