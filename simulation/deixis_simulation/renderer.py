@@ -22,8 +22,6 @@ from .surface import Surface
 
 FloatPicture = NDArray[np.float32]
 
-SHADOW_TILE_PX = 512
-TILES = 4
 SAMPLES = 4
 NEAR_M, FAR_M = 0.05, 40.0
 BRIGHTEST = 30.0
@@ -114,6 +112,7 @@ class Renderer:
         # Any: moderngl's types do not tell a uniform from a varying.
         self._programs: dict[str, Any] = {
             "room": self._program("surface.vert", "room.frag"),
+            "shade": self._program("surface.vert", "shade.frag"),
             "body": self._program("surface.vert", "body.frag"),
             "person": self._program("screen.vert", "person.frag"),
             "cover": self._program("depth.vert", "cover.frag"),
@@ -185,8 +184,8 @@ class Renderer:
             drawn.positions.write(np.ascontiguousarray(mesh.vertices, np.float32).tobytes())
             drawn.normals.write(np.ascontiguousarray(mesh.normals, np.float32).tobytes())
 
-    def light(self, lighting: Lighting, centre: Floats, *, people: bool = True) -> None:
-        """Set the lamps, and draw their shadow maps around `centre` (world); `people` False: of the room alone."""
+    def light(self, lighting: Lighting, centre: Floats) -> None:
+        """Set the lamps, and draw the shadows of the room around `centre` (world). After add_room()."""
         self._lighting = lighting
         program = self._programs["depth"]
         self._room_shadows.draw(program, lighting.lamps, centre, ROOM_SHADOW_RADIUS_M, self._room_shadow)
@@ -209,8 +208,8 @@ class Renderer:
         return _softened(self._pass(view, "room", self._whole, self._jitters[0]))
 
     def shade(self, view: View) -> FloatPicture:
-        """The room at a quarter of the size, without people; one with and one without their shadows give the shadows."""
-        pictures = [self._pass(view, self._room, self._small, jitter)[..., :3] for jitter in self._jitters[:2]]
+        """Share of the room's light that people leave to it (h / 4, w / 4, 3). After cast_people()."""
+        pictures = [self._pass(view, "shade", self._small, jitter) for jitter in self._jitters[:2]]
         mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
         return mean
 
@@ -255,8 +254,8 @@ class Renderer:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _pass(self, view: View, drawn: Sequence[_Drawn], target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
-        program = self._programs["room"]
+    def _pass(self, view: View, kind: str, target: moderngl.Framebuffer, jitter: Floats) -> FloatPicture:
+        program, matrix = self._programs[kind], _view_projection(view)
         target.use()
         self._context.viewport = (0, 0, *target.size)
         empty = 0.0 if kind == "room" else 1.0
@@ -265,8 +264,8 @@ class Renderer:
         self._set_light(program, matrix, view, jitter, self._room_shadows if kind == "room" else self._people_shadows)
         for item in self._room:
             self._set_look(program, item)
-            item.seen.render()
-        return self._read(target)
+            item.arrays[kind].render()
+        return self._read(target)[..., :3]
 
     def _people_targets(self, view: View) -> _PeopleTargets:
         size = view.width, view.height
@@ -295,7 +294,7 @@ class Renderer:
         program["camera"] = tuple(view.centre)
         for item in self._people:
             self._set_look(program, item)
-            item.seen.render()
+            item.arrays["body"].render()
 
     def _hide_behind_room(self, matrix: Floats) -> None:
         self._programs["depth"]["view_projection"].write(_uniform(matrix.T))
@@ -325,32 +324,37 @@ class Renderer:
         raw = np.frombuffer(target.read(components=4, dtype="f2"), np.float16).reshape(height, width, 4)[::-1]
         return np.clip(np.nan_to_num(raw.astype(np.float32), posinf=BRIGHTEST), 0, BRIGHTEST)
 
-    def _set_light(self, program: Any, matrix: Floats, view: View, jitter: Floats) -> None:
-        assert self._lighting is not None, "light() comes before any picture"
-        lamps = self._lighting.lamps
+    def _set_light(self, program: Any, matrix: Floats, view: View, jitter: Floats, shadows: ShadowAtlas) -> None:
+        lighting = self._lit()
+        lamps = lighting.lamps
         padded = MAX_LAMPS - len(lamps)
         values: dict[str, Any] = {
             "view_projection": _uniform(matrix.T),
             "lamp_position": _uniform([*(lamp.position for lamp in lamps), *np.zeros((padded, 3))]),
             "lamp_colour": _uniform([*(lamp.colour for lamp in lamps), *np.zeros((padded, 3))]),
-            "lamp_matrix": _uniform([*(m.T for m in self._matrices), *np.tile(np.eye(4), (padded, 1, 1))]),
-            "lamp_softness": _uniform([*(lamp.softness for lamp in lamps), *np.zeros(padded)]),
+            "lamp_matrix": _uniform([*(m.T for m in shadows.matrices), *np.tile(np.eye(4), (padded, 1, 1))]),
+            "lamp_softness": _uniform([*shadows.softness, *np.zeros(padded)]),
             "lamp_reach2": _uniform([*(lamp.reach2_m2 for lamp in lamps), *np.zeros(padded)]),
             "camera": _uniform(view.centre),
-            "ambient_up": _uniform(self._lighting.ambient_up),
-            "ambient_down": _uniform(self._lighting.ambient_down),
+            "ambient_up": _uniform(lighting.ambient_up),
+            "ambient_down": _uniform(lighting.ambient_down),
             "jitter": _uniform(jitter),
+            "shadow_raise": _uniform(shadows.raised_m),
         }
         for name, value in values.items():
             if name in program:
                 program[name].write(value)
-        self._atlas.use(3)
+        shadows.texture.use(3)
         program["lamps"], program["key_lamps"] = len(lamps), sum(lamp.key for lamp in lamps)
         program["shadow_map"] = 3
 
+    def _lit(self) -> Lighting:
+        if self._lighting is None:
+            raise RuntimeError("light() comes before any picture")
+        return self._lighting
+
     def _drawn(
         self,
-        kind: str,
         mesh: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]],
         maps: tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture],
         uniforms: dict[str, Any],
@@ -358,16 +362,10 @@ class Renderer:
     ) -> _Drawn:
         positions, normals, coordinates, part, triangles = mesh
         buffer = self._context.buffer
-        moving = bool(person)
-        at = buffer(_uniform(positions), dynamic=moving)
-        up = buffer(_uniform(normals), dynamic=moving)
+        at = buffer(_uniform(positions), dynamic=bool(person))
+        up = buffer(_uniform(normals), dynamic=bool(person))
         fixed = buffer(_uniform(np.hstack([coordinates, np.asarray(part, float)[:, None]])))
         index = buffer(np.ascontiguousarray(triangles, np.int32).tobytes())
-        whole = [(at, "3f", "in_position"), (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
-
-        def array(program: str, content: list[tuple[Any, ...]]) -> moderngl.VertexArray:
-            return self._context.vertex_array(self._programs[program], content, index, skip_errors=True)
-
         places = [(at, "3f", "in_position")]
         whole = [*places, (up, "3f", "in_normal"), (fixed, "2f 1f", "in_texture", "in_part")]
         wanted = {"body": whole, "cover": places, "label": whole} if person else {"room": whole, "shade": whole}
@@ -438,7 +436,7 @@ def _softened(light: FloatPicture) -> FloatPicture:
 def shadows_on(room: FloatPicture, share: FloatPicture) -> FloatPicture:
     """The room (h, w, 3) with people's shadows, of which `share` (h / 4, w / 4, 3) is left; see Renderer.shade."""
     height, width = room.shape[:2]
-    soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_CUBIC)
+    soft = cv2.resize(cv2.GaussianBlur(share, (0, 0), 0.9), (width, height), interpolation=cv2.INTER_LINEAR)
     return (room * soft).astype(np.float32)
 
 
@@ -461,24 +459,4 @@ def _view_projection(view: View) -> Floats:
     projection[3, 2] = 1
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = view.rotation, view.translation
-    return projection @ pose
-
-
-def _lamp_matrix(position: Floats, centre: Floats) -> Floats:
-    """A lamp looks at the people as a camera would; the cone just holds a ball around them."""
-    ahead = np.asarray(centre, float) - position
-    distance = float(np.linalg.norm(ahead))
-    ahead = ahead / distance
-    up = np.array((0.0, 1.0, 0.0)) if abs(ahead[1]) < 0.95 else np.array((0.0, 0.0, 1.0))
-    right = np.cross(ahead, up)
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
-    zoom = 1 / np.tan(np.arcsin(min(SHADOW_RADIUS_M / distance, 0.93)))
-    near, far = max(0.25, distance - 1.3 * SHADOW_RADIUS_M), distance + 2.2 * SHADOW_RADIUS_M
-    projection = np.zeros((4, 4))
-    projection[0, 0] = projection[1, 1] = zoom
-    projection[2, 2], projection[2, 3] = (far + near) / (far - near), -2 * far * near / (far - near)
-    projection[3, 2] = 1
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, -rotation @ position
     return projection @ pose

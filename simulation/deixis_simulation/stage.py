@@ -17,6 +17,8 @@ from .skinning import Mesh
 
 SHADOW_CENTRE_M = 1.05
 """Height of the middle of what casts shadows."""
+PERSON_RADIUS_M, WIDEST_RADIUS_M = 1.3, 4.0
+"""Of the ball in which people cast shadows: of one person, and of people who stand far apart."""
 SHADOWS_STAND_M = 0.004
 """Below this motion of any vertex the shadow maps of the last frame are good enough."""
 SUBFRAMES = ((1.0, 1), (3.0, 2), (12.0, 4))
@@ -58,6 +60,8 @@ class Stage:
         self._renderer.add_room(build_room(scene))
         for look, person in zip(looks, scene.people, strict=True):
             self._renderer.add_person(look, Tints(person.skin_tint, person.hair_tint, person.clothes_tint))
+        lamps_around = self._lamps_around()
+        self._renderer.light(lighting(scene.light, lamps_around), lamps_around + np.array((0.0, SHADOW_CENTRE_M, 0.0)))
         self._moves = len(scene.robot_path) > 1
         self._view: View | None = None
         self._room: FloatPicture
@@ -70,9 +74,7 @@ class Stage:
 
     def picture(self, view: View, subframes: Sequence[Sequence[Mesh]]) -> FloatPicture:
         """Linear light (h, w, 3) RGB: the mean of the people's poses in `subframes` before the room."""
-        middle = subframes[len(subframes) // 2]
-        centre = self._centre(middle)
-        self._look_at(view, centre)
+        self._look_at(view)
         if not self._scene.people:
             return self._room.copy()
         self._cast_shadows(view, subframes[len(subframes) // 2])
