@@ -430,7 +430,8 @@ def _softened(light: FloatPicture) -> FloatPicture:
     box = np.ones((3, 3), np.uint8)
     contrast = cv2.dilate(grey, box) - cv2.erode(grey, box)
     share = np.clip((contrast - EDGE_FROM) / EDGE_FROM, 0, 1)[..., None]
-    return (light + share * (cv2.GaussianBlur(light, (3, 3), 0.7) - light)).astype(np.float32)
+    softened: FloatPicture = light + share.astype(np.float32) * (cv2.GaussianBlur(light, (3, 3), 0.7) - light)
+    return softened
 
 
 def shadows_on(room: FloatPicture, share: FloatPicture) -> FloatPicture:
