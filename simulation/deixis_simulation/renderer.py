@@ -411,11 +411,8 @@ def _edged(light: FloatPicture, cover: FloatPicture) -> FloatPicture:
 def _shifts(count: int) -> Floats:
     """Offsets (count, 2) within a pixel, evenly spread, mean 0."""
     number = np.arange(count)
-    return np.stack([(number + 0.5) / count, (number * GOLDEN + 0.5 / count) % 1.0], axis=1) - _middle(count)
-
-
-def _middle(count: int) -> Floats:
-    return np.array((0.5, float(np.mean((np.arange(count) * GOLDEN + 0.5 / count) % 1.0))))
+    spread = np.stack([(number + 0.5) / count, (number * GOLDEN) % 1.0], axis=1)
+    return np.asarray(spread - spread.mean(axis=0))
 
 
 def _shifted(view: View, shift_px: Floats) -> View:
@@ -430,8 +427,8 @@ def _softened(light: FloatPicture) -> FloatPicture:
     box = np.ones((3, 3), np.uint8)
     contrast = cv2.dilate(grey, box) - cv2.erode(grey, box)
     share = np.clip((contrast - EDGE_FROM) / EDGE_FROM, 0, 1)[..., None]
-    softened: FloatPicture = light + share.astype(np.float32) * (cv2.GaussianBlur(light, (3, 3), 0.7) - light)
-    return softened
+    softer: FloatPicture = (light + share * (cv2.GaussianBlur(light, (3, 3), 0.7) - light)).astype(np.float32)
+    return softer
 
 
 def shadows_on(room: FloatPicture, share: FloatPicture) -> FloatPicture:

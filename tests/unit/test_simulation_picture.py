@@ -304,6 +304,17 @@ class TestRendering:
         stage.close()
         assert np.abs(one - other).mean() > 0.01
 
+    def test_the_room_for_a_camera_that_moves_is_that_of_one_that_stands(self):
+        renderer = Renderer(160, 120)
+        renderer.add_room(build_room(scene(room=Room(furniture=[Furniture(kind="door", along_m=0.5)]))))
+        centre = to_world((2.0, 0.0))
+        renderer.light(lighting(Light(), centre), centre + UP * 1.05)
+        view = view_at(CAMERA, RobotState())
+        fine, quick = renderer.room(view), renderer.room_at_once(view)
+        renderer.close()
+        assert np.abs(fine - quick).mean() < 0.02
+        assert np.abs((fine - quick).mean()) < 0.002, "no shift, no change of brightness"
+
     def test_people_smooth_over_the_room_at_their_edges(self):
         renderer = Renderer(160, 120)
         renderer.add_room(build_room(scene()))
