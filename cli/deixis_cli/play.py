@@ -6,7 +6,7 @@ import logging
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,6 +29,7 @@ SETTLE_S = 4.0
 MAX_TARGETS = 1000
 
 OnMessage = Callable[[str, Message], None]
+Beside = Callable[[zenoh.Session], AbstractContextManager[object]]
 
 
 @dataclass
@@ -59,16 +60,20 @@ def play(
     out: Path | None = None,
     name: str = "run",
     on_message: OnMessage | None = None,
+    beside: Beside | None = None,
     timeout_s: float | None = None,
 ) -> PlayResult:
     """Start the host's stages, play the source of the camera's settings to its end, and stop them.
 
     `out` is the folder that gets `NAME.jsonl`. `on_message` is called in this thread with (key, message) for each message,
-    frames without image bytes. Ends when the source has ended and is answered, has failed, on SIGINT or SIGTERM, or after
-    `timeout_s` seconds; a live or looping source has no other end. Never raises for what the system does: see `failure`.
+    frames without image bytes. `beside` is entered with the run's session when all stages but the source are ready, and left
+    at the end: for those who have something to say in the run themselves. Ends when the source has ended and is answered, has
+    failed, on SIGINT or SIGTERM, or after `timeout_s` seconds; a live or looping source has no other end. Never raises for
+    what the system does: see `failure`.
     """
     began_s = time.monotonic()
     playback = Playback(options, on_message, None if timeout_s is None else began_s + timeout_s)
+    playback.beside = beside
     try:
         with ExitStack() as stack:
             if out is not None:
@@ -89,6 +94,7 @@ class Playback:
         self.result = PlayResult()
         self.recorder: Recorder | None = None
         self.interrupts = Interrupts()
+        self.beside: Beside | None = None
         self._options = options
         self._on_message = on_message
         self._deadline_s = deadline_s
@@ -104,6 +110,8 @@ class Playback:
             def listen() -> None:
                 subscriber = host.session.declare_subscriber(f"deixis/{self._options.robot}/**", self._inbox.store)
                 stack.callback(subscriber.undeclare)
+                if self.beside is not None:
+                    stack.enter_context(self.beside(host.session))
 
             host.start(listen, self.interrupts.requested)
             while not self._is_over(host):

@@ -10,11 +10,15 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.codec import say
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 MAX_LABEL_BYTES = 64 << 20
+# Of R times its transpose from the identity: labels are rounded to six digits or so.
+MAX_SKEW = 1e-3
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 Point = tuple[Number, Number]
@@ -34,10 +38,11 @@ class _Label(BaseModel):
 
 
 class TrueHead(_Label):
-    """Head of a person; `yaw_rel_deg` is relative to the line from head to camera."""
+    """Head of a person; `yaw_rel_deg` is relative to the line from head to camera, `center_cam` in camera axes."""
 
     yaw_rel_deg: float
     center_px: Point
+    center_cam: Vector | None = None
 
 
 class TrueFace(_Label):
@@ -53,6 +58,8 @@ class TrueHand(_Label):
 
     center_px: Point
     centroid_visible_px: Point | None = None
+    bbox_amodal: Box | None = None
+    index_tip_px: Point | None = None
     visible_px: int = Field(ge=0)
     in_frame: bool
 
@@ -69,9 +76,10 @@ class TrueHands(_Label):
 
 
 class TrueArm(_Label):
-    """The gesturing arm; no side while none gestures."""
+    """The gesturing arm; no side while none gestures. `eye_tip_azimuth_deg`: from between the eyes over the fingertip."""
 
     side: SideName | None = None
+    eye_tip_azimuth_deg: float | None = None
 
 
 class TrueUserPos(_Label):
@@ -113,29 +121,50 @@ class TruePerson(_Label):
         return self.arm.side if "stroke" in (self.phase, self.nonpoint_phase) else None
 
 
-class TrueFrame(_Label):
-    """One frame of the file, by its index."""
+class TrueView(_Label):
+    """Where a camera is and how it is turned, OpenCV axes: x_camera = R x_world + t."""
 
-    frame: int = Field(ge=0)
-    persons: list[TruePerson] = Field(default_factory=list, max_length=32)
-
-
-class TrueCamera(_Label):
-    """The pinhole camera, OpenCV axes: x_camera = R x_world + t."""
-
-    K: tuple[Vector, Vector, Vector]
-    dist: list[Number] = Field(default_factory=list, max_length=14)
     R_world_to_cam: Annotated[list[Number], Field(min_length=9, max_length=9)]
     t_world_to_cam: Vector
-    height_m: float = Field(gt=-100, lt=100)
-    pitch_up_deg: float = Field(ge=-90, le=90)
 
     @model_validator(mode="after")
     def _looks_ahead(self) -> Self:
-        if self.K[0][0] <= 0 or self.K[1][1] <= 0:
-            raise ValueError("K: focal lengths are not positive")
         if math.hypot(self.R_world_to_cam[6], self.R_world_to_cam[8]) < 1e-3:
             raise ValueError("R_world_to_cam: the camera looks straight up or down; it has no forward direction")
+        rotation = self.rotation
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > MAX_SKEW or np.linalg.det(rotation) < 0:
+            raise ValueError("R_world_to_cam: not a rotation")
+        return self
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """R (3, 3): its rows are the camera's right, down and ahead in the world."""
+        return np.array(self.R_world_to_cam, np.float64).reshape(3, 3)
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Optical centre (3,), world, metres."""
+        return np.asarray(-self.rotation.T @ np.array(self.t_world_to_cam), np.float64)
+
+
+class TrueFrame(_Label):
+    """One frame of the file, by its index. `camera`: where it was then, of a camera that moves."""
+
+    frame: int = Field(ge=0)
+    persons: list[TruePerson] = Field(default_factory=list, max_length=32)
+    camera: TrueView | None = None
+
+
+class TrueCamera(TrueView):
+    """The pinhole camera; one that moves, as it is in frame 0. The mount is read from R and t, which are exact."""
+
+    K: tuple[Vector, Vector, Vector]
+    dist: list[Number] = Field(default_factory=list, max_length=14)
+
+    @model_validator(mode="after")
+    def _projects(self) -> Self:
+        if self.K[0][0] <= 0 or self.K[1][1] <= 0:
+            raise ValueError("K: focal lengths are not positive")
         return self
 
     @property
@@ -157,6 +186,44 @@ class TruePoi(_Label):
     xyz_world: Vector
 
 
+class TrueAction(_Label):
+    """What a rendered person was told to do; times in seconds of the clip. The words only sort clips."""
+
+    type: str = Field(max_length=64)
+    start_s: float = 0.0
+    preparation_s: float = 0.0
+    hold_s: float = 0.0
+    retraction_s: float = 0.0
+    style: str | None = Field(default=None, max_length=64)
+    hand: str | None = Field(default=None, max_length=64)
+    looks: str | None = Field(default=None, max_length=64)
+
+    @property
+    def end_s(self) -> float:
+        """End of the retraction."""
+        return self.start_s + self.preparation_s + self.hold_s + self.retraction_s
+
+
+class TrueActor(_Label):
+    """A rendered person; persons of the frames are numbered by their place in the scene."""
+
+    height_m: float = Field(gt=0, le=3)
+    actions: list[TrueAction] = Field(default_factory=list, max_length=64)
+
+
+class TrueScene(_Label):
+    """The scene that a clip was rendered from, so far as clips are sorted by it."""
+
+    people: list[TrueActor] = Field(default_factory=list, max_length=32)
+
+
+class TrueLooks(_Label):
+    """How a person looks: `face_ITA_deg` is the measured skin tone."""
+
+    id: int = Field(ge=0)
+    face_ITA_deg: float | None = None
+
+
 class TrueMeta(_Label):
     """What holds for the whole clip."""
 
@@ -166,6 +233,13 @@ class TrueMeta(_Label):
     height: int = Field(ge=1, le=8192)
     camera: TrueCamera
     pois: list[TruePoi] = Field(default_factory=list, max_length=1024)
+    persons: list[TrueLooks] = Field(default_factory=list, max_length=32)
+    scene: TrueScene | None = None
+
+    @property
+    def horizontal_fov_deg(self) -> float:
+        """Width of the view, degrees."""
+        return 2 * math.degrees(math.atan(self.width / 2 / self.camera.K[0][0]))
 
 
 class Truth(_Label):
@@ -185,7 +259,16 @@ class Truth(_Label):
             for person in frame.persons:
                 if person.points and person.poi not in known:
                     raise ValueError(f"frames.{index}.persons: poi '{person.poi}' is not in meta.pois")
+        if self.moves:
+            without = next((frame.frame for frame in self.frames if frame.camera is None), None)
+            if without is not None:
+                raise ValueError(f"frames.{without}.camera: missing, but other frames have it")
         return self
+
+    @property
+    def moves(self) -> bool:
+        """Whether the camera moves."""
+        return any(frame.camera is not None for frame in self.frames)
 
     def face_width_px(self, person: TruePerson) -> float:
         """Width of the person's face in the picture, as seen from the front at its distance."""

@@ -14,6 +14,7 @@ from .recording import Recording
 from .yaw_scores import pose_of
 
 Outcome = Literal["named", "in_set", "missed", "wrong"]
+OUTCOMES: tuple[Outcome, ...] = ("named", "in_set", "missed", "wrong")
 LATERAL_FROM_DEG = 30.0
 LATERAL_TO_DEG = 150.0
 

@@ -13,8 +13,10 @@ from deixis_runtime.host import HostOptions
 from deixis_schemas.messages import Belief, Message
 
 from .clip_score import ClipScore, failed_clip, score_clip
-from .clips import Clip
+from .clips import Clip, ClipError
 from .recording import RecordingError, read_recording
+from .speaker import Speakers
+from .stand_ins import speakers_for
 from .truth_site import write_site
 
 ROBOT = "eval"
@@ -33,12 +35,18 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True)
 class EvaluationOptions:
-    """How clips are played. `out` is the folder that gets NAME.jsonl, `sets` are settings of stages."""
+    """How clips are played. `stages` are those that run, `truth` those in whose place the truth speaks.
+
+    `out` is the folder that gets NAME.jsonl, `sets` are settings of stages. `site`: a site file to play clips with, in place of
+    one made from the truth; `sets` then name source and registry.
+    """
 
     stages: tuple[str, ...]
+    truth: tuple[str, ...] = ()
     lockstep: bool = False
     out: Path | None = None
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    site: Path | None = None
 
 
 def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[], None] | None = None) -> ClipScore:
@@ -48,12 +56,16 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
     """
     # A folder directly below the system's temporary one: the POI registry is made anew for each clip.
     with tempfile.TemporaryDirectory(prefix="deixis-eval-") as folder:
-        site = write_site(clip, Path(folder))
+        site = options.site or write_site(clip, Path(folder))
         out = options.out or Path(folder)
-        result = _play(clip, site, out, options, on_frame)
+        try:
+            speakers = Speakers(speakers_for(clip, options.truth, lockstep=options.lockstep), ROBOT, lockstep=options.lockstep)
+        except ClipError as error:
+            return failed_clip(clip.name, clip.truth, str(error))
+        result = _play(clip, site, out, options, speakers, on_frame)
         if result.signal is not None:
             raise Interrupted(result.signal)
-        failure = result.failure or _incomplete(result)
+        failure = result.failure or _incomplete(result) or next(iter(speakers.failures), None)
         if failure is not None:
             return failed_clip(clip.name, clip.truth, failure)
         try:
@@ -65,8 +77,16 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
     return score_clip(clip.name, clip.truth, recording, lockstep=options.lockstep)
 
 
-def _play(clip: Clip, site: Path, out: Path, options: EvaluationOptions, on_frame: Callable[[], None] | None) -> PlayResult:
+def _play(
+    clip: Clip,
+    site: Path,
+    out: Path,
+    options: EvaluationOptions,
+    speakers: Speakers,
+    on_frame: Callable[[], None] | None,
+) -> PlayResult:
     def hear(_: str, message: Message) -> None:
+        speakers.hear(message)
         if on_frame is not None and isinstance(message, Belief):
             on_frame()
 
@@ -74,7 +94,7 @@ def _play(clip: Clip, site: Path, out: Path, options: EvaluationOptions, on_fram
         robot=ROBOT, stages=options.stages, site=site, listen=(), lockstep=options.lockstep, sets=dict(options.sets)
     )
     timeout_s = START_S + FRAME_S * len(clip.truth.frames)
-    return play(host, out=out, name=clip.name, on_message=hear, timeout_s=timeout_s)
+    return play(host, out=out, name=clip.name, on_message=hear, beside=speakers.join, timeout_s=timeout_s)
 
 
 def _incomplete(result: PlayResult) -> str | None:

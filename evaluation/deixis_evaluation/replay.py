@@ -23,7 +23,6 @@ from deixis_headpose.estimator import HeadPoseEstimator
 from deixis_runtime.lens import Lens
 from deixis_schemas.messages import (
     CameraInfo,
-    CameraMount,
     Gestures,
     HeadPoses,
     Message,
@@ -35,8 +34,8 @@ from deixis_schemas.messages import (
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.tracker import Tracker
 
+from .camera_pose import map_position, mount_of
 from .clips import Clip
-from .truth_site import map_position
 
 Picture = npt.NDArray[np.uint8]
 T = TypeVar("T", bound=Message)
@@ -93,7 +92,7 @@ class Given:
             camera_matrix=meta.camera.matrix,
             distortion_model=meta.camera.distortion_model,
             distortion=meta.camera.dist,
-            mount=CameraMount(position_m=(0.0, 0.0, meta.camera.height_m), pitch_up_deg=meta.camera.pitch_up_deg),
+            mount=mount_of(meta.camera),
             run=RUN,
         )
 

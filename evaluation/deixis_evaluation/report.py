@@ -1,6 +1,7 @@
 """The JSON file of `deixis eval`. Its keys are documented here and stay:
 
-`machine`, `lockstep`, `folder`, `definitions` (sentences), `summary`, and `clips.NAME`; shares are 0 to 1, and null where
+`machine`, `lockstep`, `folder`, `seeds` (A:B, or null), `truth` (stages that the truth stood for), `definitions` (sentences),
+`summary`, `slices` and `clips.NAME`; shares are 0 to 1, and null where
 nothing was there to measure.
 * `summary` and `clips.NAME`: `failure` (a clip) or `failed` (names), `frames`, `frames_answered`, `latency_ms.p50|p95`,
   `face_recall`, `raised_hand_recall`, `hand_recall`, `false_hands_per_frame`, `distance_error_percent`, and
@@ -9,13 +10,15 @@ nothing was there to measure.
 * `summary`: `poi_named_share` (clips of one person who points, each stroke given its one POI), `pointing_clips`,
   `clips_named`, `outcomes.named|in_set|missed|wrong` (strokes), `quiet_clips`, `quiet_clips_with_episodes`,
   `false_episodes_quiet`, `false_episodes_pointing`, `sides.right|wrong|missed`.
+* `slices`: a list of `trait`, `value`, `clips`, `strokes`, `named`, `in_set`, `missed`, `wrong`, `named_share` and
+  `named_interval_95` (Wilson); traits in which the strokes do not differ are left out.
 * `clips.NAME`: `kind`, `family`, `episodes` (fields of episode_scores.EpisodeScore), `false_episodes` (of FalseEpisode).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ from .blob_scores import BlobScores
 from .clip_score import ClipScore, DistanceScore
 from .machine import Machine
 from .matching import DEFINITION
+from .slices import Slice
 from .summary import Summary, percentiles
 from .yaw_scores import YawBand
 
@@ -36,14 +40,29 @@ EPISODE_DEFINITION = (
 )
 
 
-def report(folder: Path, scores: Sequence[ClipScore], summary: Summary, machine: Machine, *, lockstep: bool) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Conditions:
+    """What was played and how: `seeds` of the simulator as A:B, `truth` the stages that the truth stood for."""
+
+    folder: Path
+    lockstep: bool
+    seeds: str | None = None
+    truth: tuple[str, ...] = ()
+
+
+def report(
+    conditions: Conditions, scores: Sequence[ClipScore], summary: Summary, slices: Sequence[Slice], machine: Machine
+) -> dict[str, Any]:
     """The content of the JSON file."""
     return {
         "machine": machine,
-        "lockstep": lockstep,
-        "folder": str(folder),
+        "lockstep": conditions.lockstep,
+        "folder": str(conditions.folder),
+        "seeds": conditions.seeds,
+        "truth": list(conditions.truth),
         "definitions": [EPISODE_DEFINITION, DEFINITION, YAW_DEFINITION],
         "summary": _summary(summary),
+        "slices": [_slice(item) for item in slices],
         "clips": {score.name: _clip(score) for score in scores},
     }
 
@@ -65,6 +84,18 @@ def _summary(summary: Summary) -> dict[str, Any]:
         "frames_answered": summary.frames_answered,
         "latency_ms": summary.latency_ms,
         **_perception(summary.blobs, summary.yaw, summary.distance),
+    }
+
+
+def _slice(item: Slice) -> dict[str, Any]:
+    return {
+        "trait": item.trait,
+        "value": item.value,
+        "clips": item.clips,
+        "strokes": item.strokes,
+        **item.outcomes,
+        "named_share": item.named_share,
+        "named_interval_95": list(item.named_interval),
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from .blob_scores import BlobScores
 from .clip_score import ClipScore, DistanceScore
+from .episode_scores import OUTCOMES
 from .yaw_scores import BANDS, YawBand
 
 SIDES = ("right", "wrong", "missed")
@@ -53,9 +54,7 @@ def summarise(scores: Iterable[ClipScore]) -> Summary:
         failed=tuple(score.name for score in every if score.failure is not None),
         pointing_clips=len(pointing),
         clips_named=sum(score.all_named for score in pointing),
-        outcomes=_count(
-            (item.outcome for s in pointing for item in s.answers.episodes), ("named", "in_set", "missed", "wrong")
-        ),
+        outcomes=_count((item.outcome for s in pointing for item in s.answers.episodes), OUTCOMES),
         quiet_clips=len(quiet),
         quiet_clips_with_episodes=sum(bool(score.answers.false_episodes) for score in quiet),
         false_quiet=sum(len(score.answers.false_episodes) for score in quiet),

@@ -13,16 +13,19 @@ from .clip_score import ClipScore
 from .episode_scores import EpisodeScore
 from .matching import DEFINITION
 from .report import EPISODE_DEFINITION, YAW_DEFINITION
+from .slices import Slice
 from .summary import Summary, percentiles
 from .yaw_scores import YawBand
 
 COLOURS = {"named": "green", "in_set": "yellow", "missed": "red", "wrong": "red", "right": "green"}
 
 
-def print_scores(console: Console, scores: Sequence[ClipScore], summary: Summary) -> None:
+def print_scores(console: Console, scores: Sequence[ClipScore], summary: Summary, slices: Sequence[Slice] = ()) -> None:
     """All of it, with the definitions of the figures."""
     console.print(clip_table(scores))
     console.print(yaw_table(summary.yaw))
+    if slices:
+        console.print(slice_table(slices))
     console.print(summary_table(summary))
     for definition in (EPISODE_DEFINITION, DEFINITION, YAW_DEFINITION):
         console.print(definition, style="dim", markup=False, highlight=False)
@@ -70,6 +73,27 @@ def yaw_table(bands: dict[str, YawBand]) -> Table:
     return table
 
 
+def slice_table(slices: Sequence[Slice]) -> Table:
+    """One row for each slice; a trait is named in its first row."""
+    table = Table(box=box.SIMPLE_HEAD, title="Strokes, by what they are", title_justify="left")
+    table.add_column("trait")
+    table.add_column("value")
+    for name in ("clips", "strokes", "named", "in the set", "missed", "wrong", "named (95 %)"):
+        table.add_column(name, justify="right")
+    last = ""
+    for item in slices:
+        low, high = item.named_interval
+        counts = (item.clips, item.strokes, *item.outcomes.values())
+        table.add_row(
+            "" if item.trait == last else item.trait.replace("_", " "),
+            escape(item.value),
+            *map(str, counts),
+            f"{percent(item.named_share)} ({100 * low:.0f}-{100 * high:.0f})",
+        )
+        last = item.trait
+    return table
+
+
 def summary_table(summary: Summary) -> Table:
     """The aggregates, the headline first."""
     table = Table(box=box.SIMPLE_HEAD, title="Summary", title_justify="left", show_header=False)
@@ -102,6 +126,15 @@ def summary_table(summary: Summary) -> Table:
             "[red]failed", f"[red]{len(summary.failed)} of {summary.clips} clips: {escape(', '.join(summary.failed))}"
         )
     return table
+
+
+def say_truth(truth: Sequence[str], summary: Summary) -> str:
+    """The headline of a run in which the truth stood for stages."""
+    strokes = sum(summary.outcomes.values())
+    return (
+        f"With the true {', '.join(truth)}: POI named in {summary.clips_named} of {summary.pointing_clips} pointing clips, "
+        f"{summary.outcomes['named']} of {strokes} strokes. What this run has more than one without is lost there."
+    )
 
 
 def percent(share: float | None) -> str:

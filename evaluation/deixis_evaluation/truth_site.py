@@ -5,37 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
-from .clips import Clip, TrueCamera, Vector
+from .camera_pose import map_position, mount_of
+from .clips import Clip
 
 CALIBRATION_FILE = "camera.yaml"
 
 
-def map_position(camera: TrueCamera, world: Vector) -> tuple[float, float, float]:
-    """A world point in the robot's map frame: x forward and y left from the camera's foot, z up (REP-103), metres.
-
-    Forward is the horizontal part of the optical axis; world and map share the vertical.
-    """
-    rotation = np.array(camera.R_world_to_cam).reshape(3, 3)
-    centre = -rotation.T @ np.array(camera.t_world_to_cam)
-    ahead = np.array([rotation[2, 0], 0.0, rotation[2, 2]])
-    ahead /= np.linalg.norm(ahead)
-    left = np.cross([0.0, 1.0, 0.0], ahead)
-    offset = np.array(world) - centre
-    return float(offset @ ahead), float(offset @ left), float(world[1])
-
-
 def site_content(clip: Clip, registry: Path) -> dict[str, Any]:
-    """The mapping that a site file for the clip holds. The robot stands at the map's origin; walls are not in the truth."""
+    """The mapping that a site file for the clip holds. The robot starts at the map's origin; walls are not in the truth."""
     camera = clip.truth.meta.camera
     return {
         "name": f"labelled clip {clip.name}",
         "camera": {
             "source": str(clip.video.resolve()),
             "calibration": CALIBRATION_FILE,
-            "mount": {"position_m": [0.0, 0.0, camera.height_m], "yaw_deg": 0.0, "pitch_up_deg": camera.pitch_up_deg},
+            "mount": mount_of(camera).model_dump(mode="json"),
         },
         "pois": [
             {"poi_id": poi.id, "position_m": [round(value, 6) for value in map_position(camera, poi.xyz_world)]}

@@ -1,4 +1,4 @@
-"""Arrows point down only: cli, evaluation -> services -> runtime -> schemas; no service imports another."""
+"""Arrows point down only: cli, evaluation, simulation -> services -> runtime -> schemas; no service imports another."""
 
 import ast
 from pathlib import Path
@@ -13,6 +13,10 @@ MAY_IMPORT = {
     **{f"deixis_{name}": {"deixis_schemas", "deixis_runtime"} for name in SERVICES},
     "deixis_cli": {"deixis_schemas", "deixis_runtime"},
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
+    "deixis_simulation": {
+        *("deixis_schemas", "deixis_runtime", "deixis_cli"),
+        *("deixis_camera", "deixis_fusion", "deixis_evaluation"),  # a rehearsal plays a site's clips and scores the answers
+    },
 }
 
 

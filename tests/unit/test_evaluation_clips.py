@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 import yaml
 from deixis_camera.calibration import load_calibration
-from deixis_evaluation.clips import Clip, ClipError, Truth, load_clips, load_truth
-from deixis_evaluation.truth_site import map_position, write_site
+from deixis_evaluation.camera_pose import map_position, mount_of, path_of
+from deixis_evaluation.clips import Clip, ClipError, TrueView, Truth, load_clips, load_truth
+from deixis_evaluation.truth_site import write_site
+from deixis_fusion.localisation import to_base
 from deixis_runtime.site import load_site
+from hypothesis import given
+from hypothesis import strategies as st
+from labelled_views import turned_view
 
 PITCH = 0.1
 LEVEL = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]
@@ -148,9 +153,49 @@ def test_a_tilted_and_turned_camera_still_gives_a_level_map() -> None:
 def test_the_site_of_a_clip_is_one_that_the_stages_accept(tmp_path: Path) -> None:
     clip = Clip("a", tmp_path / "a.mp4", Truth.model_validate(label()))
     site = load_site(write_site(clip, tmp_path))
-    assert site.camera["mount"] == {"position_m": [0.0, 0.0, 1.3], "yaw_deg": 0.0, "pitch_up_deg": 0.0}
+    assert site.camera["mount"] == {"position_m": [0.0, 0.0, 1.3], "yaw_deg": 0.0, "pitch_up_deg": 0.0, "roll_deg": 0.0}
     assert site.pois[0].position_m == pytest.approx((1.5, -1.0, 1.2))
     calibration = load_calibration(tmp_path / site.camera["calibration"])
     assert calibration.camera_matrix == (500, 0, 319.5, 0, 500, 239.5, 0, 0, 1)
     assert site.settings["fusion"]["registry"].startswith(str(tmp_path))
     assert yaml.safe_load((tmp_path / "camera.yaml").read_text())["image_width"] == 640
+
+
+@given(st.floats(-170, 170), st.floats(-60, 60), st.floats(-45, 45))
+def test_the_mount_is_read_from_the_rotation_and_is_the_one_that_fusion_undoes(yaw: float, pitch: float, roll: float) -> None:
+    view = TrueView.model_validate(turned_view(yaw, pitch, roll, (0.3, 1.3, 2.0)))
+    mount = mount_of(view)
+    assert (mount.pitch_up_deg, mount.roll_deg) == pytest.approx((pitch, roll), abs=1e-4)
+    assert mount.position_m == pytest.approx((0, 0, 1.3))
+    point = np.array([0.4, 1.9, -1.1])
+    optical = view.rotation @ (point - view.centre)
+    x, y, z = to_base((float(optical[0]), float(optical[1]), float(optical[2])), mount)
+    assert (x, y, z + 1.3) == pytest.approx(map_position(view, (0.4, 1.9, -1.1)), abs=1e-5)
+
+
+def moving(*views: dict[str, Any]) -> dict[str, Any]:
+    content = label()
+    content["meta"]["camera"] |= views[0]
+    content["frames"] = [{"frame": i, "persons": [], "camera": view} for i, view in enumerate(views)]
+    return content
+
+
+def test_a_camera_that_drives_and_turns_is_a_robot_that_does() -> None:
+    start = turned_view(0, 3, 2, (0, 1.3, 2.0))
+    # 1 m ahead (the world's -z), 0.5 m to the left (-x), turned 30 degrees to the left.
+    path = path_of(Truth.model_validate(moving(start, turned_view(30, 3, 2, (-0.5, 1.3, 1.0)))))
+    assert (path[0].x_m, path[0].y_m, path[0].yaw_deg) == pytest.approx((0, 0, 0))
+    assert (path[1].x_m, path[1].y_m, path[1].yaw_deg) == pytest.approx((1.0, 0.5, 30))
+    assert path_of(Truth.model_validate(label())) == []
+
+
+def test_a_moving_camera_that_tilts_or_is_not_labelled_throughout_is_refused() -> None:
+    start = turned_view(0, 3, 2, (0, 1.3, 2.0))
+    with pytest.raises(ClipError, match=r"frames\.1\.camera: tilted"):
+        path_of(Truth.model_validate(moving(start, turned_view(0, 8, 2, (0, 1.3, 2.0)))))
+    content = moving(start, start)
+    del content["frames"][1]["camera"]
+    with pytest.raises(ValueError, match=r"frames\.1\.camera: missing"):
+        Truth.model_validate(content)
+    with pytest.raises(ValueError, match="not a rotation"):
+        TrueView.model_validate(start | {"R_world_to_cam": [1, 0, 0, 0, 1, 0, 0, 0, 2]})

@@ -9,7 +9,8 @@ import pytest
 from deixis_evaluation.clip_score import ClipScore, failed_clip, latencies_ms, score_clip
 from deixis_evaluation.clips import Truth
 from deixis_evaluation.recording import Recording, RecordingError, read_recording
-from deixis_evaluation.report import report
+from deixis_evaluation.report import Conditions, report
+from deixis_evaluation.slices import Slice
 from deixis_evaluation.summary import summarise
 from deixis_evaluation.table import print_scores
 from deixis_schemas.anatomy import FACE_WIDTH_M
@@ -262,13 +263,18 @@ def test_the_summary_counts_clips_strokes_and_false_episodes_apart() -> None:
 def test_report_and_table_hold_every_clip_and_are_plain_json() -> None:
     scores = [scored(truth(), recording(), target(12, 31, "P1"), name="a"), failed_clip("d", truth(), "[router] is gone")]
     summary = summarise(scores)
-    content = json.loads(json.dumps(report(Path("clips"), scores, summary, {"cpu": "x"}, lockstep=True), allow_nan=False))
+    slices = [Slice("arm", "bent", 2, 4, {"named": 1, "in_set": 1, "missed": 2, "wrong": 0})]
+    conditions = Conditions(Path("clips"), lockstep=True, truth=("headpose",))
+    content = json.loads(json.dumps(report(conditions, scores, summary, slices, {"cpu": "x"}), allow_nan=False))
+    assert (content["seeds"], content["truth"]) == (None, ["headpose"])
+    assert (content["slices"][0]["named_share"], content["slices"][0]["missed"]) == (0.25, 2)
     assert content["summary"]["poi_named_share"] == 0.5
     assert content["clips"]["a"]["episodes"][0]["outcome"] == "named"
     assert content["clips"]["a"]["yaw"]["30-60"]["frames"] == 60
     assert content["clips"]["d"]["failure"] == "[router] is gone"
     console = Console(record=True, width=200, file=io.StringIO())
-    print_scores(console, scores, summary)
+    print_scores(console, scores, summary, slices)
+    assert "25 % (5-70)" in console.export_text(clear=False)
     assert "in 1 of 2 pointing clips (50 %)" in console.export_text(clear=False)
     assert "failed: [router] is gone" in console.export_text()
 

@@ -1,0 +1,1 @@
+"""Rendered people who point, with exact truth (optional: the five services never need it)."""
