@@ -42,7 +42,7 @@ class ClipFiles:
 def is_finished(scene: Scene, folder: Path, *, labels: bool) -> bool:
     """Whether the clip of this very scene is there, by this version of the renderer."""
     files = ClipFiles(folder, scene.name)
-    if not files.video.is_file() or (labels and not files.pictures.is_file()):
+    if not files.video.is_file() or files.video.stat().st_size == 0 or (labels and not files.pictures.is_file()):
         return False
     try:
         meta = json.loads(files.truth.read_text(encoding="utf-8"))["meta"]

@@ -45,7 +45,8 @@ Degree = Annotated[float, Field(ge=-360, le=360)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Gain = Annotated[float, Field(gt=0, le=10)]
 Colour = Annotated[tuple[Gain, Gain, Gain], Field(description="Red, green, blue factors.")]
-Tone = Annotated[tuple[int, int, int], Field(description="Red, green, blue, 0 to 255.")]
+Channel = Annotated[int, Field(ge=0, le=255)]
+Tone = Annotated[tuple[Channel, Channel, Channel], Field(description="Red, green, blue, 0 to 255.")]
 Place = tuple[Metre, Metre]
 Position = tuple[Metre, Metre, Metre]
 PoiId = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]{1,64}$")]
@@ -194,6 +195,16 @@ class Room(Part):
     furniture: list[Furniture] = Field(default_factory=list, max_length=32)
     walls: list[tuple[Place, Place]] = Field(default_factory=list, max_length=200)
 
+    @model_validator(mode="after")
+    def _has_an_inside(self) -> Self:
+        if self.back_x_m >= self.front_x_m or self.right_y_m >= self.left_y_m:
+            raise ValueError("front_x_m, left_y_m: not beyond back_x_m, right_y_m")
+        return self
+
+    def holds(self, place_m: Place) -> bool:
+        """Whether a place lies between the walls."""
+        return self.back_x_m < place_m[0] < self.front_x_m and self.right_y_m < place_m[1] < self.left_y_m
+
 
 class LightChange(Part):
     """From `at_s` on the light goes to `gain` times the usual, within `over_s`."""
@@ -285,6 +296,13 @@ class Scene(Part):
             wanted = {action.poi for action in person.actions if isinstance(action, Pointing)} - known
             if wanted:
                 raise ValueError(f"people.{number}.actions: no POI '{min(wanted)}' in pois")
+            if not self.room.holds(person.place_m):
+                raise ValueError(f"people.{number}.place_m: {person.place_m} is outside the room: it would be labelled unseen")
+            late = [action.start_s for action in person.actions if action.start_s >= self.duration_s]
+            if late:
+                raise ValueError(
+                    f"people.{number}.actions: one begins at {late[0]:g} s, after the end at {self.duration_s:g} s"
+                )
         times = [point.at_s for point in self.robot_path]
         if times != sorted(set(times)):
             raise ValueError("robot_path: at_s does not grow from waypoint to waypoint")

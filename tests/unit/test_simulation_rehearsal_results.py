@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -151,6 +152,13 @@ def test_map_is_a_png(ground: Ground, tmp_path: Path, tried: bool) -> None:
     assert picture is not None
     assert 500 < picture.shape[0] < 1600
     assert 500 < picture.shape[1] < 1800
+
+
+def test_dollars_in_names_are_no_formula(ground: Ground, tmp_path: Path) -> None:
+    odd = replace(ground, name="$a_b$", pois=tuple(replace(poi, name="$100% off$") for poi in ground.pois))
+    places = given_places(odd, [(2.0, 0.0)])
+    draw_map(tmp_path / "map.png", odd, places, aims_of(odd, places), None)
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
 TRUTH = load_truth(ROOT / "examples" / "clips" / "pointing.json")

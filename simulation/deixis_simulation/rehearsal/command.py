@@ -163,10 +163,10 @@ def _rehearse(console: Console, given: argparse.Namespace, plan: Plan, out: Path
     confusion = confusion_of(plan.aims, answers, plan.ground.too_far)
     advice = advise(plan.ground, plan.aims, confusion)
     print_report(console, plan.places, confusion, advice)
-    _write_map(console, out, plan, confusion)
     seconds = round(time.monotonic() - began_s, 1)
     told = {"seed": given.seed, "count": given.count, "seconds": seconds}
     _write_json(given, report(plan.ground, plan.places, plan.aims, confusion, advice, complete=not stopped, **told))
+    _write_map(console, out, plan, confusion)
     return _status(confusion, stopped, len(answers), len(plan.trials))
 
 

@@ -52,7 +52,9 @@ def draw_map(path: Path, ground: Ground, places: Sequence[Place], aims: Sequence
     _draw_robot(axes, ground)
     _draw_places(axes, places)
     _draw_pois(axes, ground, places, confusion)
-    figure.text(0.15 / whole_w, 1 - 0.36 / whole_h, _title(ground, confusion), fontsize=12, weight="bold", color=INK)
+    figure.text(
+        0.15 / whole_w, 1 - 0.36 / whole_h, _title(ground, confusion), fontsize=12, weight="bold", color=INK, parse_math=False
+    )
     _draw_legend(figure, (width + 0.1) / whole_w, confusion)
     corner = figure.add_axes(((width + 0.2) / whole_w, 0.1 / whole_h, KEY_IN / whole_w, KEY_IN / whole_h))
     _draw_scale(corner, ground, min(width / (right - left), height / (top - bottom)))
@@ -154,6 +156,7 @@ def _draw_pois(axes: Axes, ground: Ground, places: Sequence[Place], confusion: C
         axes.annotate(
             f"{poi.name}{_score(result)}",
             (x, y),
+            parse_math=False,  # a name may hold dollar signs
             xytext=(math.copysign(9, dx), 0) if beside else (0, math.copysign(9, dy)),
             textcoords="offset points",
             ha=("left" if dx > 0 else "right") if beside else "center",
