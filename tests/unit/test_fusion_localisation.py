@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from deixis_evaluation.camera_pose import mount_of
 from deixis_evaluation.clips import TrueCamera
 from deixis_evaluation.truth_site import map_position
 from deixis_fusion.config import PlaceConfig
@@ -209,7 +210,7 @@ def test_the_frame_of_discernment_holds_the_visible_pois_in_their_order() -> Non
 def test_bearings_of_the_pois_of_a_clip_match_its_truth_within_a_degree(name: str) -> None:
     truth = json.loads((SHIPPED / f"{name}.json").read_text())
     meta, lens = truth["meta"], TrueCamera.model_validate(truth["meta"]["camera"])
-    mount = CameraMount(position_m=(0.0, 0.0, lens.height_m), pitch_up_deg=lens.pitch_up_deg)
+    mount = mount_of(lens)
     size = (meta["width"], meta["height"])
     info = camera(camera_matrix=lens.matrix, mount=mount, width=size[0], height=size[1])
     pois = {poi["id"]: map_position(lens, poi["xyz_world"]) for poi in meta["pois"]}
