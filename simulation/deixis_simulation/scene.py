@@ -298,11 +298,6 @@ class Scene(Part):
                 raise ValueError(f"people.{number}.actions: no POI '{min(wanted)}' in pois")
             if not self.room.holds(person.place_m):
                 raise ValueError(f"people.{number}.place_m: {person.place_m} is outside the room: it would be labelled unseen")
-            late = [action.start_s for action in person.actions if action.start_s >= self.duration_s]
-            if late:
-                raise ValueError(
-                    f"people.{number}.actions: one begins at {late[0]:g} s, after the end at {self.duration_s:g} s"
-                )
         times = [point.at_s for point in self.robot_path]
         if times != sorted(set(times)):
             raise ValueError("robot_path: at_s does not grow from waypoint to waypoint")

@@ -18,10 +18,6 @@ SCENE = {"duration_s": 4.0, "pois": [{"poi_id": "a", "position_m": [1.0, 1.0, 1.
         ({"room": {"wall_tone": [300, 0, 0]}}, "room.wall_tone.0"),
         ({"room": {"front_x_m": -5}}, "room: front_x_m"),
         ({"people": [PERSON | {"place_m": [20, 0]}]}, "people.0.place_m: .* outside the room"),
-        (
-            {"people": [PERSON | {"actions": [POINTING | {"start_s": 50}]}]},
-            "people.0.actions: one begins at 50 s, after the end",
-        ),
         ({"people": [PERSON | {"actions": [POINTING | {"poi": "b"}]}]}, "people.0.actions: no POI 'b'"),
         ({"pois": [SCENE["pois"][0]] * 2}, "poi_id stands twice"),
         ({"robot_path": [{"at_s": 1}, {"at_s": 1}]}, "at_s does not grow"),
