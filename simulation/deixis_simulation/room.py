@@ -13,12 +13,14 @@ from .exhibits import build_exhibit
 from .furniture import build_furniture
 from .geometry import Floats, robot_at, to_world, view_at
 from .scene import Person, Place, Room, Scene, ScenePoi, Tone, Walk
-from .shapes import box, quad
+from .shapes import Shape, box, quad
 from .surface import Surface
 
 Rng = np.random.Generator
 
 TOO_NEAR_CAMERA_M = 0.9
+SIDE_TEXTURE_M = 3.4
+"""What one picture of a plain wall covers."""
 WALL_THICKNESS_M = 0.08
 LEG_STEPS = 5
 """Places of the camera that are looked at between two waypoints, and one more."""
@@ -80,7 +82,7 @@ def _stands_before(place: Floats, person: Floats, camera: Floats) -> bool:
 def _wall_texture(kind: str, tone: Tone, rng: Rng) -> tuple[textures.Picture, float]:
     """Texture of a wall, and how many metres it covers."""
     makers: dict[str, tuple[Callable[[Tone, Rng], textures.Picture], float]] = {
-        "plaster": (textures.plaster, 3.4),
+        "plaster": (textures.plaster, SIDE_TEXTURE_M),
         "brick": (textures.brick, 1.15),
         "wood": (textures.wood, 0.9),
         "panel": (textures.panels, 2.4),
@@ -100,64 +102,30 @@ def _walls(room: Room, rng: Rng) -> list[Surface]:
     lamps = [
         Surface(
             quad(to_world((x, y + 0.55, height - 0.01)), (1.1, 0, 0), (0, 0, -0.28)),
-            None,
-            (0, 0, 0),
+            tint=(0, 0, 0),
             emission=(3.2, 3.2, 3.0),
             casts_shadow=False,
         )
         for x in (0.8, 2.8)
         for y in (-1.1, 1.1)
     ]
+    sideways = deep / SIDE_TEXTURE_M, height / SIDE_TEXTURE_M
+    behind = wide / SIDE_TEXTURE_M, height / SIDE_TEXTURE_M
+    ceiling = quad(to_world((front, left, height)), across, toward)
     return [
-        Surface(
-            quad(to_world((front, left)), across, up, (wide / metres, height / metres)),
-            look,
-            (1, 1, 1),
-            0.9,
-            0.06,
-            casts_shadow=False,
-        ),
-        Surface(
-            quad(to_world((back, left)), -toward, up, (deep / 3.4, height / 3.4)),
-            side,
-            (1, 1, 1),
-            0.9,
-            0.05,
-            casts_shadow=False,
-        ),
-        Surface(
-            quad(to_world((front, right)), toward, up, (deep / 3.4, height / 3.4)),
-            side,
-            (1, 1, 1),
-            0.9,
-            0.05,
-            casts_shadow=False,
-        ),
-        Surface(
-            quad(to_world((back, right)), -across, up, (wide / 3.4, height / 3.4)),
-            side,
-            (1, 1, 1),
-            0.9,
-            0.05,
-            casts_shadow=False,
-        ),
-        Surface(
-            quad(to_world((back, left)), across, -toward, (wide / per, deep / per)),
-            floor,
-            (1, 1, 1),
-            0.5,
-            0.35,
-            casts_shadow=False,
-        ),
-        Surface(
-            quad(to_world((front, left, height)), across, toward),
-            None,
-            (0.9, 0.9, 0.88),
-            emission=(0.17, 0.168, 0.16),
-            casts_shadow=False,
-        ),
+        _plane(quad(to_world((front, left)), across, up, (wide / metres, height / metres)), look, gloss=0.06),
+        _plane(quad(to_world((back, left)), -toward, up, sideways), side),
+        _plane(quad(to_world((front, right)), toward, up, sideways), side),
+        _plane(quad(to_world((back, right)), -across, up, behind), side),
+        _plane(quad(to_world((back, left)), across, -toward, (wide / per, deep / per)), floor, roughness=0.5, gloss=0.35),
+        Surface(ceiling, tint=(0.9, 0.9, 0.88), emission=(0.17, 0.168, 0.16), casts_shadow=False),
         *lamps,
     ]
+
+
+def _plane(shape: Shape, texture: textures.Picture, roughness: float = 0.9, gloss: float = 0.05) -> Surface:
+    """A side of the room: it is outside of all lamps, and would only throw shadows on itself."""
+    return Surface(shape, texture, roughness=roughness, gloss=gloss, casts_shadow=False)
 
 
 def _floor(room: Room, rng: Rng) -> tuple[textures.Picture, float]:

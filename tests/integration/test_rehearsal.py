@@ -16,6 +16,7 @@ from deixis_simulation.rehearsal.performance import Venue, play_trial
 from deixis_simulation.rehearsal.places import given_places
 from deixis_simulation.rehearsal.trials import plan_trials
 from running import POINTED_AT, ROOT, SITE
+from simulation_ready import needs_renderer
 
 DEIXIS = Path(sys.executable).parent / "deixis"
 ROOM = {
@@ -28,17 +29,6 @@ ROOM = {
 def rehearse(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     command = [str(DEIXIS), "rehearse", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=280, check=False, cwd=cwd)
-
-
-def renderer_trouble() -> str | None:
-    """Why nothing can be rendered here; none where it can."""
-    try:
-        import moderngl
-
-        moderngl.create_standalone_context(backend="egl").release()
-    except Exception as error:
-        return f"no OpenGL without a display (libegl1, libgl1-mesa-dri): {error}"
-    return None
 
 
 def test_a_clip_is_answered_with_the_sites_own_pois(tmp_path: Path) -> None:
@@ -74,11 +64,9 @@ def test_what_cannot_be_is_refused(tmp_path: Path, arguments: tuple[str, ...], w
     assert words in done.stderr
 
 
+@needs_renderer
 @pytest.mark.timeout(300)
 def test_a_tiny_site_is_rehearsed(tmp_path: Path) -> None:
-    trouble = renderer_trouble()
-    if trouble is not None:
-        pytest.skip(trouble)
     site = tmp_path / "room.yaml"
     site.write_text(yaml.safe_dump(ROOM))
     done = rehearse(

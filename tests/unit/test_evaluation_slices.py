@@ -9,6 +9,7 @@ from deixis_evaluation.slices import slices_of
 from deixis_evaluation.wilson import wilson
 from hypothesis import given
 from hypothesis import strategies as st
+from labelled_views import STANDING
 
 HAND = {"center_px": [300, 400], "visible_px": 400, "in_frame": True}
 
@@ -31,11 +32,7 @@ def clip(name: str, distance_m: float = 2.0, tone: float | None = None, **action
         "fps": 30,
         "width": 640,
         "height": 480,
-        "camera": {
-            "K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]],
-            "R_world_to_cam": [1, 0, 0, 0, -1, 0, 0, 0, -1],
-            "t_world_to_cam": [0, 1.3, 2],
-        },
+        "camera": STANDING,
         "pois": [{"id": "P1", "xyz_world": [1, 1, 0]}],
         "persons": [{"id": 0, "face_ITA_deg": tone}],
     }
@@ -96,5 +93,8 @@ def test_wilsons_interval_holds_the_share_and_is_one(hits: int, misses: int) -> 
 
 def test_wilsons_interval_of_known_counts() -> None:
     assert wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    # Newcombe 1998, table I: 81 of 263, 15 of 148.
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)
+    assert wilson(15, 148) == pytest.approx((0.0624, 0.1605), abs=1e-4)
     with pytest.raises(ValueError, match="3 of 2"):
         wilson(3, 2)

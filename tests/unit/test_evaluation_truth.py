@@ -19,6 +19,7 @@ from deixis_fusion.localisation import RobotPlace
 from deixis_fusion.robot_path import RobotPath
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import Frame, Gestures, HeadPoses, RobotPose, Tracks
+from labelled_views import STANDING
 
 FRAME_NS = 33_333_333
 
@@ -53,11 +54,7 @@ def truth(*persons: dict[str, Any], frames: int = 3) -> Truth:
         "fps": 30,
         "width": 640,
         "height": 480,
-        "camera": {
-            "K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]],
-            "R_world_to_cam": [1, 0, 0, 0, -1, 0, 0, 0, -1],
-            "t_world_to_cam": [0, 1.3, 2],
-        },
+        "camera": STANDING,
         "pois": [{"id": "P1", "xyz_world": [1, 1, 0]}],
     }
     shown = [{"frame": index, "persons": list(persons)} for index in range(frames)]

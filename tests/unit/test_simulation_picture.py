@@ -13,7 +13,7 @@ from deixis_simulation import shapes, textures
 from deixis_simulation.encode import EncodeError, Encoder
 from deixis_simulation.geometry import RobotState, to_world, view_at
 from deixis_simulation.lights import light_gain_at, lighting, picture_gains
-from deixis_simulation.renderer import Renderer, RenderError, Tints, over
+from deixis_simulation.renderer import Renderer, Tints, over
 from deixis_simulation.room import build_room, is_drawn
 from deixis_simulation.scene import (
     Camera,
@@ -33,6 +33,7 @@ from deixis_simulation.scene import (
 from deixis_simulation.sensor import SensorModel
 from deixis_simulation.shadows import coarse_triangles
 from deixis_simulation.stage import Stage
+from simulation_ready import needs_renderer
 
 CAMERA = Camera(width=160, height=120)
 UP = np.array((0.0, 1.0, 0.0))
@@ -88,14 +89,6 @@ def body(place=(2.0, 0.0)):
     part = np.r_[np.full(len(trunk.vertices), 7), np.full(len(head.vertices), 1)]
     plain = np.full((8, 8, 3), 180, np.uint8)
     return BoxBody(both, plain, np.full((8, 8, 3), (128, 128, 255), np.uint8), np.full((8, 8), 255, np.uint8), part)
-
-
-@pytest.fixture
-def with_egl():
-    try:
-        Renderer(64, 48).close()
-    except RenderError as error:
-        pytest.skip(str(error))
 
 
 PERSON = Person(avatar="box", place_m=(2.0, 0.0))
@@ -222,7 +215,7 @@ def test_a_film_that_cannot_be_written_is_an_error_that_names_it(tmp_path):
         Encoder(tmp_path / "no_such" / "film.mp4", 160, 120, 25, 20)
 
 
-@pytest.mark.usefixtures("with_egl")
+@needs_renderer
 class TestRendering:
     """On this machine's OpenGL."""
 

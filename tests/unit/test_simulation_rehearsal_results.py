@@ -15,13 +15,11 @@ from deixis_runtime.site import load_site
 from deixis_simulation.rehearsal.advice import advise
 from deixis_simulation.rehearsal.aims import aims_of
 from deixis_simulation.rehearsal.answers import Answer, answer_of
-from deixis_simulation.rehearsal.confusion import confusion_of, wilson
+from deixis_simulation.rehearsal.confusion import confusion_of
 from deixis_simulation.rehearsal.floor_map import draw_map
 from deixis_simulation.rehearsal.ground import Ground, ground_of
 from deixis_simulation.rehearsal.places import given_places
 from deixis_simulation.rehearsal.report import print_report, report
-from hypothesis import given
-from hypothesis import strategies as st
 from rich.console import Console
 
 ROOT = Path(__file__).parents[2]
@@ -59,20 +57,6 @@ ANSWERS = [
     answer(None, false_answers=(("door",),)),
     Answer("A_door_1", "A", "door", failure="no OpenGL"),
 ]
-
-
-@given(st.integers(0, 200), st.integers(0, 200))
-def test_wilson_holds_the_share(hits: int, more: int) -> None:
-    low, high = wilson(hits, hits + more)
-    share = hits / (hits + more) if hits + more else 0.5
-    assert 0 <= low <= share + 1e-9
-    assert share - 1e-9 <= high <= 1
-
-
-def test_wilson_as_published() -> None:
-    # Newcombe 1998, table I: 81 of 263, 15 of 148.
-    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)
-    assert wilson(15, 148) == pytest.approx((0.0624, 0.1605), abs=1e-4)
 
 
 def test_answers_are_counted_by_poi(ground: Ground) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
+
+from deixis_evaluation.wilson import wilson
 
 from .aims import Aim
 from .answers import Answer, Cause
@@ -16,7 +17,6 @@ Verdict = Literal["told_apart", "tied", "confused", "untried"]
 """Of a POI: named in TOLD_APART_SHARE of its tries; named or among the answered ones in so many; in fewer; never tried."""
 
 TOLD_APART_SHARE = 2 / 3
-Z_95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class PoiResult:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of that share."""
-        return wilson(self.outcomes["named"], self.tries)
+        """Wilson's 95 % interval of that share; 0 to 1 without tries."""
+        return wilson(self.outcomes["named"], self.tries) or (0.0, 1.0)
 
     @property
     def verdict(self) -> Verdict:
@@ -123,16 +123,6 @@ def confusion_of(aims: Sequence[Aim], answers: Sequence[Answer], too_far: Sequen
         extra_answers=sum(len(answer.false_answers) for answer in pointed),
         failures=tuple((answer.trial, answer.failure) for answer in answers if answer.failure is not None),
     )
-
-
-def wilson(hits: int, tries: int) -> tuple[float, float]:
-    """95 % interval of a share by Wilson (1927); 0 to 1 without tries."""
-    if tries == 0:
-        return 0.0, 1.0
-    share, square = hits / tries, Z_95**2
-    middle = (share + square / (2 * tries)) / (1 + square / tries)
-    half = Z_95 * math.sqrt(share * (1 - share) / tries + square / (4 * tries**2)) / (1 + square / tries)
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _result(poi: GroundPoi, answers: Sequence[Answer]) -> PoiResult:
