@@ -33,7 +33,7 @@ class Moment:
     """A person at a time; world frame, metres.
 
     phase: of a pointing; nonpoint_phase: of a quiet gesture. poi, arm_side: while there is a phase; gestures of both arms have
-    none. head_rotation (3, 3): world from a head that faces +Z; gaze_deg: yaw, pitch up of the eyes in the head. head_centre,
+    none. head_rotation (3, 3): world from a head that faces +Z. head_centre,
     eyes (3,). shoulder ... fingertip: (3,) per side. place (3,): on the floor; azimuth_deg: where the body faces, from +Z
     toward +X.
     """
@@ -48,7 +48,6 @@ class Moment:
     azimuth_deg: float
     skeleton: Skeleton
     morphs: dict[str, float]
-    gaze_deg: tuple[float, float]
     head_rotation: Floats
     head_centre: Floats
     eyes: Floats
@@ -182,7 +181,6 @@ def _moment(time_s: float, stance: Stance, posture: Posture, skeleton: Skeleton,
         azimuth_deg=stance.azimuth_deg,
         skeleton=skeleton,
         morphs=posture.morphs,
-        gaze_deg=posture.gaze,
         head_rotation=skeleton.rotation("Head"),
         head_centre=skeleton.carried("Head", body.head_centre),
         eyes=skeleton.carried("Head", body.eyes),

@@ -7,7 +7,7 @@ is kept relative to the chest, so that it goes along when the trunk turns.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,10 +33,6 @@ class Arm:
     shape: HandShape
     clavicle_up_deg: float = 0.0
     clavicle_ahead_deg: float = 0.0
-
-    def with_shape(self, shape: HandShape) -> Arm:
-        """The same arm with another hand."""
-        return replace(self, shape=shape)
 
 
 def outward(side: ArmSide) -> float:

@@ -29,11 +29,6 @@ def to_world(position_m: Sequence[float]) -> Floats:
     return world
 
 
-def to_map(world: Floats) -> Floats:
-    """A world position in the map."""
-    return WORLD_OF_MAP.T @ world
-
-
 def world_turn_deg(heading_deg: float) -> float:
     """A map heading as a turn about the world's Y from +Z, positive toward +X: 0 faces a robot that looks along x."""
     return wrap_deg(heading_deg - 180.0)
