@@ -36,8 +36,13 @@ class Pose:
 
     def step_from(self, other: Pose) -> Array:
         """The step (6,) for which `other.moved(step)` is this pose."""
-        turn, _ = cv2.Rodrigues(self.rotation @ other.rotation.T)
-        return np.concatenate([turn.ravel(), self.position_m - other.position_m])
+        matrix = self.rotation @ other.rotation.T
+        turn = cv2.Rodrigues(matrix)[0].ravel()
+        if not turn.any():
+            # OpenCV takes a turn below 1e-5 rad for none; so small a one is the matrix's skew part.
+            skew = matrix - matrix.T
+            turn = 0.5 * np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        return np.concatenate([turn, self.position_m - other.position_m])
 
     def seen(self) -> Array:
         """Rotation (3, 3) relative to the line head -> camera; identity for a head that looks into the camera."""
