@@ -138,6 +138,10 @@ class Renderer:
         self._people_casting: list[moderngl.VertexArray] = []
         self._jitters = np.random.default_rng(5).integers(0, 300, (12, 2)).astype(float)
 
+    def take_over(self) -> None:
+        """Make this the renderer that draws, where a process has several: OpenGL goes by the thread, not by the object."""
+        self._context.__enter__()
+
     def close(self) -> None:
         """Give the context's memory back."""
         self._context.release()
@@ -164,19 +168,23 @@ class Renderer:
     def add_person(self, look: Avatar, tints: Tints) -> None:
         """Add a person; its number is the count of those before it."""
         maps = self._texture(look.colours), self._texture(look.normal_map), self._texture(look.skin_mask)
-        uniforms = {
-            "skin_tint": tuple(tints.skin),
-            "hair_tint": tuple(tints.hair),
-            "clothes_tint": tuple(tints.clothes),
-        }
         part = np.where(look.is_eye, EYE, look.part)
         mesh = look.vertices, np.zeros((len(part), 3)), look.texture_coordinates, part, look.triangles
-        person = self._drawn(mesh, maps, uniforms, len(self._people) + 1)
+        person = self._drawn(mesh, maps, {}, len(self._people) + 1)
         self._people.append(person)
+        self.tint(len(self._people) - 1, tints)
         coarse = coarse_triangles(look.vertices, look.triangles, look.part, SHADOW_CELL_M)
         places = [(person.positions, "3f", "in_position")]
         index = self._context.buffer(coarse.tobytes())
         self._people_casting.append(self._context.vertex_array(self._programs["depth"], places, index))
+
+    def tint(self, number: int, tints: Tints) -> None:
+        """Give a person other colours."""
+        self._people[number].uniforms = {
+            "skin_tint": tuple(tints.skin),
+            "hair_tint": tuple(tints.hair),
+            "clothes_tint": tuple(tints.clothes),
+        }
 
     def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
@@ -213,14 +221,15 @@ class Renderer:
         mean: FloatPicture = np.mean(pictures, axis=0, dtype=np.float32)
         return mean
 
-    def people(self, view: View, jitter: int = 0) -> FloatPicture:
+    def people(self, view: View, jitter: int = 0, *, smooth: bool = True) -> FloatPicture:
         """The people alone (h, w, 4), linear and premultiplied by their cover, hidden by what stands before them.
 
-        The view may be a window of the picture: the time is that of its pixels.
+        The view may be a window of the picture: the time is that of its pixels. Not smooth: edges are stair-stepped, in half
+        the time where the window is small.
         """
         matrix = _view_projection(view)
         targets = self._people_targets(view)
-        cover = self._cover(matrix, targets)
+        cover = self._cover(matrix, targets) if smooth else None
         self._draw_bodies(matrix, view, targets)
         targets.lit.use()
         self._context.disable(moderngl.DEPTH_TEST)
@@ -232,7 +241,8 @@ class Renderer:
             program[name] = unit + 4
         self._screen.render()
         self._context.enable(moderngl.DEPTH_TEST)
-        return _edged(self._read(targets.lit), cover)
+        light = self._read(targets.lit)
+        return light if cover is None else _edged(light, cover)
 
     def labels(self, view: View) -> NDArray[np.uint8]:
         """Per pixel person << 5 | skin << 4 | part (h, w); 0 where there is nobody."""

@@ -1,0 +1,301 @@
+"""Heads to fit and to check head pose on: any turn, any light, faces that no avatar has, and exact truth.
+
+A clip shows one person at a few turns; a regression needs tens of thousands of heads, and more faces than there are avatars.
+So each portrait warps its avatar's head smoothly (`warped_head`), tints it, may put glasses on it, and is taken from anywhere
+around it. What a camera adds on top (blur, noise, size, crops) is left to who uses them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from .arms import hanging_arm
+from .avatars import Avatar, Picture, load_avatar
+from .body import Body, fit_body
+from .dice import Dice
+from .draw import HELD_OUT_FROM_SEED, draw_scene
+from .draw_bodies import draw_bodies
+from .draw_lens import Overrides, draw_sensor
+from .geometry import Floats, View, robot_at, view_at
+from .lights import lighting
+from .renderer import FloatPicture, Renderer, Tints, over
+from .rotations import about, turn, unit
+from .scene import Light, Scene, Sensor
+from .sensor import SensorModel
+from .skeleton import SIDES, Posture, Skeleton, solve
+from .skinning import Mesh, skin
+from .stage import Stage
+from .truth_head import MIRROR
+
+SIDE_PX, SIDE_M = 96, 0.5
+"""A portrait is a square of so many pixels and, at the head's distance, about so many metres."""
+ROOMS, ROOM_SIZE = 24, (320, 240)
+VIEWS = 16
+"""Portraits of one person in one light: posing and shadows cost more than a look."""
+BUST_M = 0.4
+"""So far below the base of the head a person is drawn."""
+LANDMARKS = ("right_eye", "left_eye", "nose", "mouth", "chin", "right_ear", "left_ear", "crown")
+_BUMPS, _BUMP_M, _BUMP_RADIUS_M = 6, 0.004, (0.02, 0.06)
+_GLASSES, _HANDS = 0.2, 0.12
+"""Shares of portraits with glasses, and with something before the face."""
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """A square picture of a head, and how it is turned.
+
+    picture: (SIDE_PX, SIDE_PX, 3) BGR. rotation: (3, 3) of head axes to camera axes (x right, y down, z ahead) where the head
+    is on the camera's axis: identity for one that looks into the camera. landmarks_px: (8, 2) of LANDMARKS, seen or not, the
+    persons's own sides. centre_px: middle of the skull. breadth_px: ear to ear, as from the front.
+    """
+
+    picture: Picture
+    rotation: Floats
+    landmarks_px: Floats
+    centre_px: Floats
+    breadth_px: float
+
+
+def portraits(seed: int, avatars: Sequence[str], count: int) -> Iterator[Portrait]:
+    """So many portraits of people made from these avatars; the same for the same arguments. Raises RenderError."""
+    rng = np.random.default_rng(seed)
+    scenes = _scenes(rng)
+    rooms = [_empty_room(scene) for scene in scenes]
+    studios: dict[str, Renderer] = {}
+    made = 0
+    try:
+        while made < count:
+            scene = scenes[int(rng.integers(len(scenes)))]
+            for portrait in _sitting(rng, avatars, scene, rooms, studios, min(VIEWS, count - made)):
+                made += 1
+                yield portrait
+    finally:
+        for studio in studios.values():
+            studio.close()
+
+
+def warped_head(body: Body, rng: np.random.Generator) -> Body:
+    """The body with another head: stretched along its axes and with smooth bumps, nearly the same on both sides."""
+    share = _head_share(body)[:, None]
+    middle = body.head_centre
+    stretch = 1 + rng.normal(0, [0.06, 0.06, 0.06])
+    offset = (body.vertices - middle) * (stretch - 1)
+    at = body.vertices - middle
+    for _ in range(_BUMPS):
+        place = unit(rng.normal(size=3)) * 0.1 * body.head_scale
+        radius, height = rng.uniform(*_BUMP_RADIUS_M), rng.normal(0, _BUMP_M, 3)
+        for mirror in (np.ones(3), np.array([-1.0, 1.0, 1.0])):
+            near = np.exp(-0.5 * np.sum((at - place * mirror) ** 2, axis=1) / radius**2)
+            offset += near[:, None] * height * mirror * rng.uniform(0.85, 1.15)
+    hair = body.avatar.is_hair & (body.avatar.part == 1)
+    offset[hair] += (at * rng.uniform(-0.02, 0.1))[hair]
+    moved = (body.vertices + share * offset).astype(np.float32)
+    return replace(body, vertices=moved)
+
+
+# --- one person -----------------------------------------------------------------------------------------------------------
+
+
+def _sitting(
+    rng: np.random.Generator,
+    avatars: Sequence[str],
+    scene: Scene,
+    rooms: Sequence[FloatPicture],
+    studios: dict[str, Renderer],
+    count: int,
+) -> Iterator[Portrait]:
+    dice = Dice(rng)
+    drawn = draw_bodies(dice, avatars, 1)[0]
+    avatar = load_avatar(drawn.avatar)
+    body = warped_head(fit_body(avatar, drawn.height_m), rng)
+    posture = _posture(rng, body)
+    skeleton = solve(body, posture)
+    mesh = skin(skeleton, posture.morphs)
+    studio = _studio(avatar, studios)
+    studio.tint(0, Tints(drawn.skin_tint, drawn.hair_tint, drawn.clothes_tint))
+    _light(studio, scene.light, dice, skeleton, mesh)
+    sensor = SensorModel(_of_portrait_size(scene, draw_sensor(dice)))
+    for number in range(count):
+        view = _view(rng, skeleton, posture)
+        picture = over(studio.people(view, smooth=number % 4 == 0), _background(rng, rooms))
+        if number == 0:
+            sensor.meter(picture)
+        yield _portrait(rng, sensor.expose(picture, number, float(rng.uniform(0.6, 1.5))), skeleton, mesh, view)
+
+
+def _studio(avatar: Avatar, studios: dict[str, Renderer]) -> Renderer:
+    """The renderer of that avatar: its pictures take longer to load than a dozen portraits."""
+    if avatar.name not in studios:
+        studios[avatar.name] = Renderer(SIDE_PX, SIDE_PX)
+        studios[avatar.name].add_person(_bust(avatar), Tints())
+    studios[avatar.name].take_over()
+    return studios[avatar.name]
+
+
+def _bust(avatar: Avatar) -> Avatar:
+    """The avatar without what no portrait shows."""
+    seen = avatar.vertices[:, 1] > avatar.joint("Head")[1] - BUST_M
+    return replace(avatar, triangles=avatar.triangles[seen[avatar.triangles].any(axis=1)])
+
+
+def _posture(rng: np.random.Generator, body: Body) -> Posture:
+    neck = float(np.clip(rng.normal(0, 32), -75, 75))
+    lids = float(rng.uniform(0.4, 1)) if rng.random() < 0.15 else 0.0
+    morphs = dict.fromkeys(("LeyeClose", "ReyeClose"), lids)
+    if rng.random() < 0.4:
+        morphs[str(rng.choice(["MouthOpen", "AE_AA", "UH_OO"]))] = float(rng.uniform(0.1, 1))
+    return Posture(
+        arms={side: hanging_arm(body, side, *rng.uniform(-0.02, 0.02, 3)) for side in SIDES},
+        spine=(0.0, float(rng.normal(2, 5)), float(rng.normal(0, 3))),
+        head=(neck, float(np.clip(rng.normal(-4, 12), -35, 30)), float(np.clip(rng.normal(0, 7), -25, 25))),
+        gaze=(float(np.clip(rng.normal(0, 12), -28, 28)), float(rng.normal(0, 6))),
+        morphs=morphs,
+    )
+
+
+def _of_portrait_size(scene: Scene, sensor: Sensor) -> Scene:
+    size = {"width": SIDE_PX, "height": SIDE_PX}
+    return scene.model_copy(update={"camera": scene.camera.model_copy(update=size), "sensor": sensor})
+
+
+def _light(renderer: Renderer, light: Light, dice: Dice, skeleton: Skeleton, mesh: Mesh) -> None:
+    # Lamps stand around the person as it faces; cameras go all the way round, so light comes from anywhere.
+    place = (dice.between(-1.5, 1.5), 0.0, dice.between(-1.5, 1.5))
+    renderer.light(lighting(light, place), np.zeros(3))
+    renderer.pose([mesh])
+    renderer.cast_people(skeleton.position("Head") - np.array([0.0, 0.3, 0.0]), 0.9)
+
+
+def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture) -> View:
+    """A camera that looks at the head from anywhere around it: three in four times not farther than 110 degrees aside."""
+    yaw = float(rng.uniform(-110, 110) if rng.random() < 0.75 else rng.uniform(-180, 180))
+    azimuth, elevation = posture.head[0] - yaw, float(np.clip(rng.normal(3, 11), -30, 40))
+    roll = float(np.clip(rng.normal(0, 6), -20, 20))
+    back = turn(azimuth, -elevation) @ np.array([0.0, 0.0, 1.0])
+    body = skeleton.body
+    distance = float(np.exp(rng.uniform(np.log(0.8), np.log(5.0))))
+    centre = skeleton.carried("Head", body.head_centre)
+    eye = centre + back * distance
+    across = unit(np.cross([0.0, 1.0, 0.0], back))
+    rotation = about([0.0, 0.0, 1.0], roll) @ np.stack([across, -np.cross(back, across), -back])
+    focal = SIDE_PX / SIDE_M * distance / body.head_scale * float(rng.uniform(0.92, 1.08))
+    middle = (SIDE_PX - 1) / 2 + rng.uniform(-4, 4, 2)
+    matrix = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
+    return View(SIDE_PX, SIDE_PX, matrix, rotation, -rotation @ eye)
+
+
+def _portrait(rng: np.random.Generator, picture: Picture, skeleton: Skeleton, mesh: Mesh, view: View) -> Portrait:
+    body = skeleton.body
+    centre = skeleton.carried("Head", body.head_centre)
+    in_camera = MIRROR @ view.rotation @ skeleton.rotation("Head")
+    places, breadth_m = _landmarks(body.avatar, skeleton, mesh)
+    depth = float(view.in_camera(centre)[2])
+    if rng.random() < _GLASSES:
+        picture = _with_glasses(rng, picture, skeleton, view)
+    if rng.random() < _HANDS:
+        picture = _with_something_before(rng, picture)
+    return Portrait(
+        picture=picture,
+        rotation=MIRROR @ in_camera @ MIRROR,
+        landmarks_px=view.project(places),
+        centre_px=view.project(centre),
+        breadth_px=breadth_m * view.matrix[0, 0] / depth,
+    )
+
+
+def _landmarks(avatar: Avatar, skeleton: Skeleton, mesh: Mesh) -> tuple[Floats, float]:
+    """Places (8, 3) of LANDMARKS, world, and the breadth of the head ear to ear, metres."""
+    rows = avatar.head_vertices
+    at = avatar.vertices[rows] - avatar.eyes
+    face = (at[:, 1] > -0.13) & (at[:, 1] < 0.0)
+    ears = face & (at[:, 2] < -0.03)
+    picks = {
+        "nose": rows[np.argmax(np.where(face & (at[:, 1] > -0.06), at[:, 2], -9))],
+        "mouth": rows[np.argmin(np.hypot(at[:, 0], at[:, 1] + 0.068) + np.where(at[:, 2] < -0.02, 9, 0))],
+        "chin": rows[np.argmin(np.where((np.abs(at[:, 0]) < 0.02) & (at[:, 2] > -0.06), at[:, 1], 9))],
+        "right_ear": rows[np.argmin(np.where(ears, at[:, 0], 9))],
+        "left_ear": rows[np.argmax(np.where(ears, at[:, 0], -9))],
+        "crown": rows[np.argmax(at[:, 1])],
+    }
+    found = {name: mesh.vertices[row].astype(float) for name, row in picks.items()}
+    found["right_eye"], found["left_eye"] = skeleton.position("RightEye"), skeleton.position("LeftEye")
+    breadth = float(np.linalg.norm(found["left_ear"] - found["right_ear"]))
+    return np.array([found[name] for name in LANDMARKS]), breadth
+
+
+# --- what is before and behind --------------------------------------------------------------------------------------------
+
+
+def _with_glasses(rng: np.random.Generator, picture: Picture, skeleton: Skeleton, view: View) -> Picture:
+    """Rims around the eyes and the near arm of the glasses: drawn, not rendered, which at this size looks the same."""
+    head = skeleton.rotation("Head")
+    scale = skeleton.body.head_scale
+    angle = np.linspace(0, 2 * np.pi, 17)
+    wide, high = rng.uniform(0.02, 0.029), rng.uniform(0.014, 0.025)
+    rim = np.stack([wide * np.cos(angle), high * np.sin(angle), np.full(17, 0.022)], axis=1)
+    toward = unit(view.centre - skeleton.position("Head")) @ head
+    colour = tuple(int(v) for v in rng.integers(0, 90, 3))
+    thick = int(rng.integers(1, 3))
+    drawn = picture.copy()
+    for bone, side in (("RightEye", -1.0), ("LeftEye", 1.0)):
+        eye = skeleton.position(bone)
+        if toward[2] > -0.1 and toward @ unit([side * 0.5, 0, 1.0]) > -0.05:
+            ring = view.project(eye + (rim * scale) @ head.T)
+            if rng.random() < 0.3:
+                shade = drawn.copy()
+                cv2.fillPoly(shade, [np.round(ring).astype(np.int32)], colour)
+                drawn = cv2.addWeighted(shade, 0.7, drawn, 0.3, 0)
+            cv2.polylines(drawn, [np.round(ring * 8).astype(np.int32)], True, colour, thick, cv2.LINE_AA, 3)
+        if toward[0] * side > 0.15:
+            arm = np.array([[side * 0.03, 0.005, 0.02], [side * 0.042, 0.004, -0.075]]) * scale
+            line = view.project(eye + arm @ head.T)
+            cv2.polylines(drawn, [np.round(line * 8).astype(np.int32)], False, colour, thick, cv2.LINE_AA, 3)
+    return np.asarray(drawn, np.uint8)
+
+
+def _with_something_before(rng: np.random.Generator, picture: Picture) -> Picture:
+    """A hand, an arm or a thing that covers a part."""
+    drawn = picture.copy()
+    colour = picture[tuple(rng.integers(20, 76, 2))] if rng.random() < 0.6 else rng.integers(0, 256, 3)
+    centre, axes = rng.uniform(15, 81, 2), rng.uniform(6, 20, 2)
+    mask = np.zeros(picture.shape[:2], np.uint8)
+    cv2.ellipse(mask, (tuple(centre), tuple(2 * axes), float(rng.uniform(0, 180))), 255, -1)
+    soft = (cv2.GaussianBlur(mask, (0, 0), 0.8) / 255.0)[..., None]
+    shaded = np.asarray(colour, float) * np.linspace(*rng.uniform(0.7, 1.2, 2), SIDE_PX)[:, None, None]
+    return np.asarray(np.clip(drawn * (1 - soft) + shaded * soft, 0, 255), np.uint8)
+
+
+def _background(rng: np.random.Generator, rooms: Sequence[FloatPicture]) -> FloatPicture:
+    room = rooms[int(rng.integers(len(rooms)))]
+    side = int(rng.integers(SIDE_PX // 2, min(room.shape[:2])))
+    top, left = (int(rng.integers(0, size - side + 1)) for size in room.shape[:2])
+    part = room[top : top + side, left : left + side] * np.float32(rng.uniform(0.3, 1.5))
+    return np.asarray(cv2.resize(part, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _scenes(rng: np.random.Generator) -> list[Scene]:
+    """Scenes whose empty rooms, lights and cameras the portraits are taken in; of fitting seeds."""
+    seeds = rng.choice(HELD_OUT_FROM_SEED, ROOMS, replace=False)
+    return [draw_scene(int(seed), 0, overrides=Overrides(size=ROOM_SIZE)) for seed in seeds]
+
+
+def _empty_room(scene: Scene) -> FloatPicture:
+    """Linear light (h, w, 3) of a scene without its people."""
+    stage = Stage(scene.model_copy(update={"people": []}), [])
+    try:
+        return stage.picture(view_at(scene.camera, robot_at(scene.robot_path, 0.0)), [])
+    finally:
+        stage.close()
+
+
+def _head_share(body: Body) -> Floats:
+    """How far each vertex goes with the head (n,), 0 to 1."""
+    avatar = body.avatar
+    below = [avatar.bone_index["Head"]]
+    for row in below:
+        below.extend(np.flatnonzero(avatar.parent == row).tolist())
+    return np.asarray(avatar.weights[:, below].sum(axis=1)).ravel().astype(float)
