@@ -83,7 +83,8 @@ def _draw_yaw(axes: Axes, samples: Sequence[HeadSample], frames: int) -> None:
     axes.set_ylim(low, high)
     axes.yaxis.set_major_locator(MultipleLocator(TICK_DEG if high - low > 3 * TICK_DEG else TICK_DEG / 3))
     axes.axhline(0, color=GREY, linewidth=0.6, zorder=0)
-    axes.grid(axis="y", color="#e6e9ec", linewidth=0.6, zorder=0)
+    axes.set_axisbelow(True)
+    axes.grid(axis="y", color="#e6e9ec", linewidth=0.6)
     axes.tick_params(labelbottom=False, bottom=False, colors=INK, labelsize=8)
     _frame(axes)
 
