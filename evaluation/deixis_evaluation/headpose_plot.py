@@ -20,10 +20,15 @@ from .headpose_scores import HeadposeScore, score_heads
 INK, GREY, PAPER = "#22303c", "#8a949c", "#ffffff"
 TRUE_COLOUR, STATED_COLOUR = "#22303c", "#c8372d"
 COLOURS = {"tracking": "#2f9e5b", "out_of_range": "#e0a02a", "initialising": "#6f9fd0", "lost": "#d8462f", ABSENT: "#d5d9dd"}
+LABELS = {"out_of_range": "out of range (side shaded)"}
 OUT_OF_RANGE_FROM_DEG = 100.0
 """Where the side said is drawn, in place of an angle that is not."""
+SIDE_SHOWN_DEG = {"left": 135.0, "right": -135.0}
+"""A panel reaches so far where a side is said, be it the wrong one."""
 WIDTH_IN, PERSON_IN, HEADER_IN, FOOTER_IN, DPI = 10.0, 3.2, 0.5, 0.7, 110
 WRAP_DEG, TICK_DEG = 180.0, 30.0
+LONGEST_TITLE = 78
+"""Letters that fit; a longer one is set smaller."""
 STRIP = 0.06
 """Height of the strip of status, by that of a person's panel."""
 Floats = NDArray[np.float64]
@@ -35,7 +40,9 @@ def draw_heads(path: Path, score: HeadposeScore) -> None:
     height = HEADER_IN + FOOTER_IN + PERSON_IN * max(len(persons), 1)
     figure = Figure(figsize=(WIDTH_IN, height), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)
-    figure.text(0.08, 1 - 0.32 / height, _title(score), fontsize=12, weight="bold", color=INK, parse_math=False)
+    title = _title(score)
+    size = min(12.0, 12.0 * LONGEST_TITLE / len(title))
+    figure.text(0.08, 1 - 0.32 / height, title, fontsize=size, weight="bold", color=INK, parse_math=False)
     for row, person in enumerate(persons):
         samples = [item for item in score.samples if item.person == person]
         bottom = (FOOTER_IN + PERSON_IN * (len(persons) - 1 - row) + 0.25) / height
@@ -47,9 +54,10 @@ def draw_heads(path: Path, score: HeadposeScore) -> None:
         yaw.set_ylabel(f"yaw of person {person}, degrees" if len(persons) > 1 else "yaw, degrees", color=INK)
         if row == len(persons) - 1:
             strip.set_xlabel("frame", color=INK)
-    if not persons:
+    if persons:
+        _draw_legend(figure)
+    else:
         figure.text(0.5, 0.5, "no head is in the picture", ha="center", color=GREY)
-    _draw_legend(figure)
     figure.savefig(path, format="png")
 
 
@@ -58,7 +66,7 @@ def _title(score: HeadposeScore) -> str:
     if heads.yaw.mae_deg is None:
         return f"{score.name}: no yaw stated"
     answered = heads.answered.share or 0.0
-    return f"{score.name}: yaw off by {heads.yaw.mae_deg:.1f}° on average in the {100 * answered:.0f} % of frames answered"
+    return f"{score.name}: yaw off by {heads.yaw.mae_deg:.1f}° (MAE), {100 * answered:.0f} % of frames answered"
 
 
 def _panels(figure: Figure, bottom: float, height: float) -> tuple[Axes, Axes]:
@@ -72,13 +80,15 @@ def _draw_yaw(axes: Axes, samples: Sequence[HeadSample], frames: int) -> None:
     true = _over_time([(item.frame, item.true.yaw) for item in samples], frames)
     stated = _over_time([(item.frame, item.tracked.yaw_deg) for item in samples if item.tracked], frames)
     sigma = _over_time([(item.frame, item.sigma_deg("yaw")) for item in samples], frames)
-    low, high = _limits(true, stated)
-    at, middle, spread = _broken(stated, sigma)
+    sides = [item.side for item in samples if item.status == "out_of_range"]
+    shown = [edge for side, edge in SIDE_SHOWN_DEG.items() if side in sides]
+    low, high = _limits(np.concatenate([true, stated, shown]))
+    at, middle, spread = broken(stated, sigma)
     for times, alpha in ((2, 0.14), (1, 0.22)):
         edges = middle - times * spread, middle + times * spread
         axes.fill_between(at, *edges, color=STATED_COLOUR, alpha=alpha, linewidth=0)
     _draw_sides(axes, samples, low, high)
-    axes.plot(*_broken(true), color=TRUE_COLOUR, linewidth=1.6)
+    axes.plot(*broken(true), color=TRUE_COLOUR, linewidth=1.6)
     axes.plot(at, middle, color=STATED_COLOUR, linewidth=1.4)
     axes.set_ylim(low, high)
     axes.yaxis.set_major_locator(MultipleLocator(TICK_DEG if high - low > 3 * TICK_DEG else TICK_DEG / 3))
@@ -118,15 +128,14 @@ def _over_time(values: Sequence[tuple[int, float | None]], frames: int) -> Float
     return line
 
 
-def _broken(angles: Floats, *others: Floats) -> tuple[Floats, ...]:
+def broken(angles: Floats, *others: Floats) -> tuple[Floats, ...]:
     """Frame, angle and others with a gap where the angle passes from 180 to -180: drawn through, it would be a turn."""
     leaps = np.flatnonzero(np.abs(np.diff(angles)) > WRAP_DEG) + 1
     return tuple(np.insert(line, leaps, np.nan) for line in (np.arange(len(angles), dtype=np.float64), angles, *others))
 
 
-def _limits(true: Floats, stated: Floats) -> tuple[float, float]:
+def _limits(known: Floats) -> tuple[float, float]:
     """Of the panel: all yaw in it, in steps of a tick, and never so near that noise fills it."""
-    known = np.concatenate([true, stated])
     low, high = min(float(np.nanmin(known)) - 8, -TICK_DEG), max(float(np.nanmax(known)) + 8, TICK_DEG)
     return max(TICK_DEG * np.floor(low / TICK_DEG), -WRAP_DEG), min(TICK_DEG * np.ceil(high / TICK_DEG), WRAP_DEG)
 
@@ -144,7 +153,7 @@ def _draw_legend(figure: Figure) -> None:
         Patch(color=STATED_COLOUR, alpha=0.33, linewidth=0, label="1 sigma"),
         Patch(color=STATED_COLOUR, alpha=0.14, linewidth=0, label="2 sigma"),
     ]
-    statuses = [Patch(color=colour, linewidth=0, label=status.replace("_", " ")) for status, colour in COLOURS.items()]
+    statuses = [Patch(color=colour, linewidth=0, label=LABELS.get(status, status)) for status, colour in COLOURS.items()]
     legend = figure.legend(
         handles=lines + statuses, loc="lower center", ncol=9, frameon=False, fontsize=8, columnspacing=1.2, handlelength=1.6
     )

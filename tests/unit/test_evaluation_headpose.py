@@ -13,7 +13,7 @@ from deixis_evaluation.angle_scores import AngleScore, signed_error_deg
 from deixis_evaluation.clips import TrueHead
 from deixis_evaluation.head_samples import HeadSample, angle_score
 from deixis_evaluation.headpose_command import check_headpose
-from deixis_evaluation.headpose_plot import draw_heads
+from deixis_evaluation.headpose_plot import broken, draw_heads
 from deixis_evaluation.headpose_report import HeadposeConditions, headpose_report
 from deixis_evaluation.headpose_scores import HEAD_BANDS, HeadposeScore, head_band, score_bands, score_heads
 from deixis_evaluation.headpose_table import print_headpose
@@ -227,6 +227,13 @@ def test_the_tables_name_clips_and_bands_and_say_what_is_meant() -> None:
 def test_a_clip_is_drawn_also_where_nobody_is_in_it(tmp_path: Path, number: int) -> None:
     draw_heads(tmp_path / "a.png", scores()[number])
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_yaw_that_passes_180_is_drawn_with_a_gap() -> None:
+    frames, angles, sigma = broken(np.array([170.0, 178.0, -174.0, -166.0]), np.array([1.0, 2.0, 3.0, 4.0]))
+    np.testing.assert_equal(angles, [170, 178, np.nan, -174, -166])
+    np.testing.assert_equal(sigma, [1, 2, np.nan, 3, 4])
+    np.testing.assert_equal(frames, [0, 1, np.nan, 2, 3])
 
 
 # --- usage -------------------------------------------------------------------------------------------------------------------
