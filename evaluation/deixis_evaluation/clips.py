@@ -38,11 +38,22 @@ class _Label(BaseModel):
 
 
 class TrueHead(_Label):
-    """Head of a person; `yaw_rel_deg` is relative to the line from head to camera, `center_cam` in camera axes."""
+    """Head of a person; `yaw_rel_deg` is relative to the line from head to camera, `center_cam` in camera axes.
+
+    R_cam: row-major rotation to axes x to the picture's right, y up, z toward the camera; identity for a head that looks along
+    the optical axis into the camera.
+    """
 
     yaw_rel_deg: float
     center_px: Point
     center_cam: Vector | None = None
+    R_cam: Annotated[list[Number], Field(min_length=9, max_length=9)] | None = None
+
+    @model_validator(mode="after")
+    def _is_turned(self) -> Self:
+        if self.R_cam is not None and not is_rotation(np.array(self.R_cam, np.float64).reshape(3, 3)):
+            raise ValueError("R_cam: not a rotation")
+        return self
 
 
 class TrueFace(_Label):
@@ -131,8 +142,7 @@ class TrueView(_Label):
     def _looks_ahead(self) -> Self:
         if math.hypot(self.R_world_to_cam[6], self.R_world_to_cam[8]) < 1e-3:
             raise ValueError("R_world_to_cam: the camera looks straight up or down; it has no forward direction")
-        rotation = self.rotation
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > MAX_SKEW or np.linalg.det(rotation) < 0:
+        if not is_rotation(self.rotation):
             raise ValueError("R_world_to_cam: not a rotation")
         return self
 
@@ -291,6 +301,11 @@ class Clip:
     name: str
     video: Path
     truth: Truth
+
+
+def is_rotation(matrix: NDArray[np.float64]) -> bool:
+    """Whether a matrix (3, 3) is a rotation, but for the digits that labels leave out."""
+    return bool(np.abs(matrix @ matrix.T - np.eye(3)).max() <= MAX_SKEW and np.linalg.det(matrix) > 0)
 
 
 def load_clips(folder: Path, pattern: str = "*") -> list[Clip]:

@@ -1,13 +1,12 @@
 """`deixis eval`: score labelled clips (NAME.mp4 with NAME.json) by playing each through the whole system.
 
 The clips are those of a folder, or the simulator's (`--seeds`). With `--truth` the labels answer in place of some stages: what
-then becomes right was lost in these.
+then becomes right was lost in these. With `--stage` one stage alone is scored, in finer detail and without the system.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -17,12 +16,15 @@ from typing import Any
 from deixis_cli.options import CommandError, stage_settings
 from deixis_runtime.host import chosen_stages
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from .chosen_clips import Choice, choose
+from .chosen_clips import Choice, Chosen, choose
+from .clip_progress import played
 from .clip_score import ClipScore
 from .clips import Clip, ClipError
 from .evaluate import EvaluationOptions, Interrupted, evaluate_clip
+from .headpose_command import check_headpose, run_headpose
+from .headpose_report import HeadposeConditions
+from .json_file import check_writable, write_json
 from .machine import describe_machine, say_machine
 from .report import Conditions, report
 from .seeds import SeedsError
@@ -33,6 +35,8 @@ from .table import print_scores, say_truth
 
 TABLE_WIDTH = 150
 """Of a table that goes to a file: a terminal has its own."""
+SCORED_ALONE = ("headpose",)
+"""Stages that `--stage` knows."""
 
 
 def register(subparsers: Any) -> None:
@@ -44,6 +48,12 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where these clips are kept (default: in the user's cache)")
     parser.add_argument("--jobs", type=_jobs, metavar="J", help="how many are rendered at a time (default: one a processor)")
     parser.add_argument(
+        "--stage",
+        type=_stage,
+        metavar="STAGE",
+        help=f"score this stage alone, without starting the system: {', '.join(SCORED_ALONE)}",
+    )
+    parser.add_argument(
         "--truth",
         type=_stages,
         default=(),
@@ -51,7 +61,12 @@ def register(subparsers: Any) -> None:
         help="the labels answer in place of these stages: headpose, gesture, tracker, or some of them with commas",
     )
     parser.add_argument("--lockstep", action="store_true", help="feed a frame when the last is answered: reproducible")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write NAME.jsonl there, one line per message published")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write NAME.jsonl there, one line per message published; with --stage NAME.png, the stage's answers over time",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all scores to this file")
     parser.add_argument("--only-clips", default="*", metavar="GLOB", help="only clips whose name fits, e.g. 'c*'")
     parser.add_argument(
@@ -62,14 +77,14 @@ def register(subparsers: Any) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Score the clips. 0 when all were played, 1 when one was not. Raises CommandError or HostFailed."""
-    choice = Choice(given.folder, given.seeds, given.only_clips, given.kinds, given.cache, given.jobs)
+    return _run_system(given) if given.stage is None else _run_headpose(given)
+
+
+def _run_system(given: argparse.Namespace) -> int:
     stages = chosen_stages((), given.truth)
     sets = stage_settings(given.sets)
-    try:
-        chosen = choose(choice, Console(stderr=True))
-    except (ClipError, SeedsError) as error:
-        raise CommandError(str(error)) from None
-    _check_writable(given.json)
+    chosen = _choose(given)
+    check_writable(given.json)
     options = EvaluationOptions(stages, given.truth, given.lockstep, given.out, sets)
     blind = say_blind(chosen.clips, given.truth)
     if blind is not None:
@@ -84,36 +99,47 @@ def run(given: argparse.Namespace) -> int:
     return _tell(conditions, given.json, scores, slices_of(chosen.clips, scores))
 
 
+def _run_headpose(given: argparse.Namespace) -> int:
+    sets = stage_settings(given.sets)
+    setup = check_headpose(given.truth, sets)
+    chosen = _choose(given)
+    check_writable(given.json)
+    conditions = HeadposeConditions(chosen.folder, chosen.seeds, given.truth, sets)
+    return run_headpose(chosen, setup, conditions, given.out, given.json, _console())
+
+
+def _choose(given: argparse.Namespace) -> Chosen:
+    choice = Choice(given.folder, given.seeds, given.only_clips, given.kinds, given.cache, given.jobs)
+    try:
+        return choose(choice, Console(stderr=True))
+    except (ClipError, SeedsError) as error:
+        raise CommandError(str(error)) from None
+
+
 def _evaluate(clips: Sequence[Clip], options: EvaluationOptions) -> list[ClipScore]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"), TimeRemainingColumn())
     scores = []
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", total=sum(len(clip.truth.frames) for clip in clips))
-        played = 0
-        for number, clip in enumerate(clips, 1):
-            progress.update(task, description=f"{clip.name} ({number} of {len(clips)})")
-            score = evaluate_clip(clip, options, lambda: progress.advance(task))
-            if score.failure is not None:
-                progress.console.print(f"{clip.name}: {score.failure}", style="red", markup=False)
-            scores.append(score)
-            # Frames that were not answered are done with, too.
-            played += len(clip.truth.frames)
-            progress.update(task, completed=played)
+    for clip, on_frame, complain in played(clips):
+        score = evaluate_clip(clip, options, on_frame)
+        if score.failure is not None:
+            complain(f"{clip.name}: {score.failure}")
+        scores.append(score)
     return scores
 
 
-def _tell(conditions: Conditions, json_file: Path | None, scores: Sequence[ClipScore], slices: Sequence[Slice]) -> int:
-    summary, machine = summarise(scores), describe_machine()
+def _console() -> Console:
     console = Console()
     if not console.is_terminal:
         console.width = TABLE_WIDTH
+    return console
+
+
+def _tell(conditions: Conditions, json_file: Path | None, scores: Sequence[ClipScore], slices: Sequence[Slice]) -> int:
+    summary, machine, console = summarise(scores), describe_machine(), _console()
     print_scores(console, scores, summary, slices)
     if conditions.truth:
         console.print(say_truth(conditions.truth, summary), markup=False, highlight=False, soft_wrap=True)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
-    if json_file is not None:
-        content = report(conditions, scores, summary, slices, machine)
-        json_file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_json(json_file, report(conditions, scores, summary, slices, machine))
     unanswered = [score.name for score in scores if score.failure is None and score.frames_answered < score.frames]
     if conditions.lockstep and unanswered:
         print(f"deixis eval: not reproducible, for frames went without an answer: {', '.join(unanswered)}", file=sys.stderr)
@@ -130,6 +156,12 @@ def _names(text: str) -> tuple[str, ...]:
     return names
 
 
+def _stage(text: str) -> str:
+    if text not in SCORED_ALONE:
+        raise argparse.ArgumentTypeError(f"'{text}' cannot be scored alone; known: {', '.join(SCORED_ALONE)}")
+    return text
+
+
 def _stages(text: str) -> tuple[str, ...]:
     try:
         return read_stages(text)
@@ -141,14 +173,3 @@ def _jobs(text: str) -> int:
     if not text.isdigit() or not 1 <= int(text) <= 64:
         raise argparse.ArgumentTypeError(f"'{text}': not a number from 1 to 64")
     return int(text)
-
-
-def _check_writable(path: Path | None) -> None:
-    """Refuse before an hour of work what cannot be written after it. Raises CommandError."""
-    if path is None:
-        return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("a", encoding="utf-8").close()
-    except OSError as error:
-        raise CommandError(f"--json {path}: {error.strerror}") from None

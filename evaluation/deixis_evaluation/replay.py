@@ -68,9 +68,15 @@ class Given:
                 read, picture = video.read()
                 if not read:
                     raise ReplayError(f"'{self.clip.video}' ends at frame {seq}, its labels do not")
+                self._check_size(*picture.shape[1::-1])
                 yield self.frame(seq), np.asarray(picture, dtype=np.uint8)
         finally:
             video.release()
+
+    def _check_size(self, width: int, height: int) -> None:
+        meta = self.clip.truth.meta
+        if (width, height) != (meta.width, meta.height):
+            raise ReplayError(f"'{self.clip.video}' is {width} x {height}, its labels speak of {meta.width} x {meta.height}")
 
     def frame(self, seq: int) -> OfFrame:
         """The frame's identity, with media time for its stamp."""

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from deixis_schemas import topics
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import MAX_CONTOUR_BYTES, Frame, FrontalFace, KindProbabilities, Message, Track, Tracks
+from deixis_schemas.messages import MAX_CONTOUR_BYTES, Frame, FrontalFace, KindProbabilities, Message, OfFrame, Track, Tracks
 from numpy.typing import NDArray
 
 from .clips import Clip, ClipError, Point, TrueHand, TruePerson, Truth
@@ -55,12 +55,13 @@ class TrueTracks:
 
     def hear(self, message: Message) -> Sequence[Message]:
         """The tracks of a frame."""
-        if not isinstance(message, Frame):
-            return ()
+        return (self.of_frame(message),) if isinstance(message, Frame) else ()
+
+    def of_frame(self, frame: OfFrame) -> Tracks:
+        """The tracks of a frame; frames are given in order."""
         meta = self._truth.meta
-        tracks = self._tracks(message.seq) if message.seq < len(self._truth.frames) else []
-        made = Tracks.derive(message, producer_of(self.topic), width=meta.width, height=meta.height, tracks=tracks)
-        return (made,)
+        tracks = self._tracks(frame.seq) if frame.seq < len(self._truth.frames) else []
+        return Tracks.derive(frame, producer_of(self.topic), width=meta.width, height=meta.height, tracks=tracks)
 
     def _tracks(self, seq: int) -> list[Track]:
         labels = self._labels.at(seq)

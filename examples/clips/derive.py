@@ -21,6 +21,7 @@ from typing import Any
 import cv2
 import numpy as np
 from deixis_evaluation.clips import load_truth
+from deixis_evaluation.true_angles import MIRROR
 
 COPIED = {"pointing": "a02_point_m60", "wave": "a05_wave", "head_turn": "b06_headturn90"}
 POINTS, WAVES = "c11_point_p60", "d01_wave_left"
@@ -30,6 +31,8 @@ FOCAL_PX = 560.0
 TURN_POINTS_DEG, TURN_WAVES_DEG, PITCH_UP_DEG = -11.0, 21.5, 1.1
 SEAM_PX = 296
 """Left of it the one who waves, right of it the one who points."""
+DIGITS = {"R_cam": 5}
+"""Of what needs more digits than the rest: three would make it no rotation."""
 
 Move = Callable[[float, float], tuple[float, float]]
 
@@ -115,7 +118,10 @@ class Turn:
     def person(self, person: dict[str, Any]) -> None:
         """Change a person's labels to what the turned camera sees."""
         move_person(person, self._move)
-        person["head"]["center_cam"] = (self._rotation @ person["head"]["center_cam"]).tolist()
+        head = person["head"]
+        head["center_cam"] = (self._rotation @ head["center_cam"]).tolist()
+        turned = MIRROR @ self._rotation @ MIRROR @ np.array(head["R_cam"]).reshape(3, 3)
+        head["R_cam"] = turned.ravel().tolist()
         x, y = person["user_pos"]["robot_xy"]
         # The map's forward axis turns with the camera, to the right.
         cosine, sine = math.cos(self._turn), math.sin(self._turn)
@@ -184,7 +190,7 @@ def short(value: Any, digits: int = 3) -> Any:
     if isinstance(value, float):
         return round(value, digits)
     if isinstance(value, dict):
-        return {name: short(item, digits) for name, item in value.items()}
+        return {name: short(item, DIGITS.get(name, digits)) for name, item in value.items()}
     return [short(item, digits) for item in value] if isinstance(value, list | tuple) else value
 
 

@@ -12,6 +12,7 @@ A reader ignores fields it does not know; a field that changes its meaning raise
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -23,6 +24,10 @@ MAX_POIS = 1024
 MAX_CONTOUR_BYTES = 65536
 MAX_LISTED = 16
 MAX_TEXT = 2000
+COVARIANCE_SLACK = 1e-6
+"""Of correlations beyond those of a positive semidefinite matrix: what rounding does."""
+SIGMA_SLACK = 1e-3
+"""Relative difference that a standard deviation stated twice may have."""
 
 # A name is one part of a key and, of robots, of a path: `.` and `..` are none, and no option begins like one.
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]{0,63}$"
@@ -35,6 +40,8 @@ Pixel = Annotated[float, Field(ge=-4 * MAX_SIDE_PX, le=4 * MAX_SIDE_PX)]
 Extent = Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]
 Metre = Annotated[float, Field(ge=-1e5, le=1e5)]
 Degree = Annotated[float, Field(ge=-360, le=360)]
+Variance = Annotated[float, Field(gt=0, le=180**2)]
+Covariance = Annotated[float, Field(ge=-(180**2), le=180**2)]
 Point = tuple[Pixel, Pixel]
 Position = tuple[Metre, Metre, Metre]
 
@@ -235,12 +242,34 @@ class HeadPose(Part):
     yaw_sigma_deg: Annotated[float, Field(gt=0, le=180)] | None = None
     pitch_deg: Degree | None = None
     roll_deg: Degree | None = None
+    covariance_deg2: tuple[Variance, Covariance, Covariance, Variance, Covariance, Variance] | None = Field(
+        default=None,
+        description="Covariance of yaw (y), pitch (p) and roll (r), degrees squared: yy, yp, yr, pp, pr, rr. Positive "
+        "semidefinite; where `yaw_sigma_deg` is there too, it is the square root of yy.",
+    )
     side: Side | None = Field(default=None, description="Side the head is turned to where out of range: the person's own.")
 
     @model_validator(mode="after")
     def _tracking_has_yaw(self) -> Self:
         if self.status == "tracking" and (self.yaw_deg is None or self.yaw_sigma_deg is None):
             raise ValueError("yaw_deg: a pose with status 'tracking' needs yaw_deg and yaw_sigma_deg")
+        return self
+
+    @model_validator(mode="after")
+    def _covariance_is_one(self) -> Self:
+        if self.covariance_deg2 is None:
+            return self
+        yy, yp, yr, pp, pr, rr = self.covariance_deg2
+        # Of a symmetric matrix of three, all principal minors tell; of the correlations, so that one slack fits all sizes.
+        y, p, r = math.sqrt(yy), math.sqrt(pp), math.sqrt(rr)  # a product of two variances may be too small for a number
+        a, b, c = yp / y / p, yr / y / r, pr / p / r
+        lowest = min(1 - a * a, 1 - b * b, 1 - c * c, 1 + 2 * a * b * c - a * a - b * b - c * c)
+        if not lowest >= -COVARIANCE_SLACK:
+            raise ValueError("covariance_deg2: not positive semidefinite, so the covariance of nothing")
+        if self.yaw_sigma_deg is not None and abs(self.yaw_sigma_deg - y) > SIGMA_SLACK * y:
+            raise ValueError(
+                f"yaw_sigma_deg: {self.yaw_sigma_deg:.6g}, but the variance of yaw in covariance_deg2 makes it {y:.6g}"
+            )
         return self
 
 

@@ -110,7 +110,15 @@ SAMPLES: tuple[m.Message, ...] = (
         FRAME,
         m.Producer("headpose", "edge-2"),
         poses=[
-            m.HeadPose(person_id=0, status="tracking", yaw_deg=58.5, yaw_sigma_deg=4.0, pitch_deg=-6.0, roll_deg=1.0),
+            m.HeadPose(
+                person_id=0,
+                status="tracking",
+                yaw_deg=58.5,
+                yaw_sigma_deg=4.0,
+                pitch_deg=-6.0,
+                roll_deg=1.0,
+                covariance_deg2=(16.0, -1.5, 0.5, 9.0, 0.25, 4.0),
+            ),
             m.HeadPose(person_id=1, status="out_of_range", side="right"),
         ],
     ),

@@ -97,6 +97,51 @@ def test_a_pose_that_tracks_needs_its_sigma():
         codec.validate(m.HeadPose, {"person_id": 0, "status": "tracking", "yaw_deg": 3.0})
 
 
+HEAD = {"person_id": 0, "status": "tracking", "yaw_deg": 3.0, "yaw_sigma_deg": 2.0, "pitch_deg": 1.0, "roll_deg": 0.0}
+
+
+def test_a_head_without_covariance_decodes_as_before():
+    message = m.HeadPoses.derive(FRAME, m.Producer("headpose", "h"), poses=[m.HeadPose(**HEAD)])
+    content = message.model_dump()
+    del content["poses"][0]["covariance_deg2"]
+    assert codec.decode(m.HeadPoses, msgpack.packb(content), codec.encoding_of(m.HeadPoses)) == message
+
+
+def test_a_covariance_comes_back_as_it_was_sent():
+    pose = m.HeadPose(**HEAD, covariance_deg2=(4.0, -1.0, 0.5, 9.0, 0.0, 1.0))
+    message = m.HeadPoses.derive(FRAME, m.Producer("headpose", "h"), poses=[pose])
+    back = codec.decode(m.HeadPoses, codec.encode(message), codec.encoding_of(m.HeadPoses))
+    assert back.poses[0].covariance_deg2 == (4.0, -1.0, 0.5, 9.0, 0.0, 1.0)
+
+
+def test_a_covariance_may_be_of_full_correlation_and_its_sigma_rounded():
+    edge = m.HeadPose(**HEAD | {"yaw_sigma_deg": 2.0 * 1.0009}, covariance_deg2=(4.0, 6.0, 2.0, 9.0, 3.0, 1.0))
+    assert edge.covariance_deg2 is not None
+    tiny = m.HeadPose(**HEAD | {"yaw_sigma_deg": 1e-4}, covariance_deg2=(1e-8, 0.0, 0.0, 32400.0, 0.0, 1e-8))
+    assert tiny.covariance_deg2 is not None
+
+
+@pytest.mark.parametrize(
+    ("covariance", "named"),
+    [
+        ((0.0, 0.0, 0.0, 1.0, 0.0, 1.0), "covariance_deg2.0: .*greater than 0"),
+        ((4.0, 0.0, 0.0, -1.0, 0.0, 1.0), "covariance_deg2.3: .*greater than 0"),
+        ((4.0, 0.0, 0.0, 1.0, 0.0, 32401.0), "covariance_deg2.5: .*less than or equal to 32400"),
+        ((4.0, 0.0, math.nan, 1.0, 0.0, 1.0), "covariance_deg2.2: .*finite"),
+        ((4.0, 0.0, 0.0, math.inf, 0.0, 1.0), "covariance_deg2.3: "),
+        ((4.0, 0.0, 0.0, 1.0, 0.0), "covariance_deg2"),
+        ((4.0, 2.1, 0.0, 1.0, 0.0, 1.0), "covariance_deg2: not positive semidefinite"),
+        # Each pair of angles could be so, the three of them cannot.
+        ((4.0, 1.8, 1.8, 1.0, -0.9, 1.0), "covariance_deg2: not positive semidefinite"),
+        ((4.0, 2.0, 0.0, 5e-324, 0.0, 5e-324), "covariance_deg2: not positive semidefinite"),
+        ((4.1, 0.0, 0.0, 1.0, 0.0, 1.0), "yaw_sigma_deg: 2, but the variance of yaw in covariance_deg2 makes it 2.02"),
+    ],
+)
+def test_what_is_no_covariance_is_refused_and_named(covariance, named):
+    with pytest.raises(codec.Malformed, match=named):
+        codec.validate(m.HeadPose, HEAD | {"covariance_deg2": covariance})
+
+
 def test_too_many_bytes_are_refused_before_they_are_read():
     with pytest.raises(codec.Malformed, match="more than the 100 allowed"):
         codec.decode(m.Tracks, bytes(101), LABEL, max_bytes=100)

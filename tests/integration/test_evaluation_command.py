@@ -9,6 +9,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from deixis_evaluation.clips import load_clips
+from deixis_evaluation.headpose_play import HeadposeSetup, play_heads
+from deixis_evaluation.recording import read_recording
 
 DEIXIS = Path(sys.executable).parent / "deixis"
 FRAMES = 12
@@ -107,7 +110,7 @@ def outputs(path: Path) -> list[Any]:
     return sorted(kept, key=lambda entry: order[entry["key"]])
 
 
-def test_two_lockstep_runs_of_a_clip_give_equal_outputs(tmp_path: Path, clips: Path) -> None:
+def test_two_lockstep_runs_of_a_clip_give_equal_outputs_and_cores_alone_equal_heads(tmp_path: Path, clips: Path) -> None:
     for run in ("first", "second"):
         done = evaluate(clips, "--lockstep", "--only-clips", "small", "--out", tmp_path / run)
         assert done.returncode == 0, done.stderr
@@ -115,3 +118,6 @@ def test_two_lockstep_runs_of_a_clip_give_equal_outputs(tmp_path: Path, clips: P
     assert sum(entry["type"] == "Belief" for entry in first) == 63
     assert sum(entry["type"] == "Target" and entry["message"]["final"] for entry in first) == 1
     assert first == second
+    whole = read_recording(tmp_path / "first" / "small.jsonl")
+    alone = play_heads(load_clips(clips, "small")[0], HeadposeSetup())
+    assert [alone.poses_at(frame) for frame in range(63)] == [whole.poses_at(frame) for frame in range(63)]

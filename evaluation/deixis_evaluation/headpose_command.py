@@ -1,0 +1,107 @@
+"""`deixis eval --stage headpose`: the headpose stage alone, on what it needs of the chain."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+from deixis_cli.options import CommandError
+from deixis_headpose.config import HeadposeConfig
+from deixis_runtime.settings import CommonOptions, ConfigError, StageConfig, load_config
+from deixis_tracker.config import TrackerConfig
+from rich.console import Console
+
+from .chosen_clips import Chosen
+from .clip_progress import played
+from .headpose_play import HeadposeSetup, evaluate_heads
+from .headpose_report import HeadposeConditions, headpose_report
+from .headpose_scores import HeadposeScore
+from .headpose_table import print_headpose
+from .json_file import write_json
+from .machine import describe_machine, say_machine
+from .replay import INSTANCE
+
+BEFORE = "tracker"
+"""The stage that headpose is fed by: the truth can stand for it, and it can be set."""
+Draw = Callable[[Path, HeadposeScore], None]
+C = TypeVar("C", bound=StageConfig)
+
+
+def check_headpose(truth: Sequence[str], sets: Mapping[str, Sequence[str]]) -> HeadposeSetup:
+    """Read what the cores are played with. Raises CommandError for what does not go with this stage alone."""
+    others = [stage for stage in truth if stage != BEFORE]
+    if others:
+        raise CommandError(f"--truth {','.join(others)}: with --stage headpose the truth can stand for {BEFORE} alone")
+    played_stages = ("headpose",) if truth else (BEFORE, "headpose")
+    for stage in sets:
+        if stage not in played_stages:
+            raise CommandError(f"--set {stage}: with --stage headpose only {' and '.join(played_stages)} are played")
+    return HeadposeSetup(
+        tracker=_config("tracker", TrackerConfig, sets),
+        headpose=_config("headpose", HeadposeConfig, sets),
+        true_tracks=BEFORE in truth,
+    )
+
+
+def run_headpose(
+    chosen: Chosen,
+    setup: HeadposeSetup,
+    conditions: HeadposeConditions,
+    out: Path | None,
+    json_file: Path | None,
+    console: Console,
+) -> int:
+    """Play, draw into `out`, and tell. 0 when all clips were played, 1 when one was not. Raises CommandError."""
+    draw = drawer(out)
+    cv2.setNumThreads(1)  # as the stages do
+    scores = []
+    for clip, on_frame, complain in played(chosen.clips):
+        score = evaluate_heads(clip, setup, on_frame)
+        if score.failure is not None:
+            complain(f"{clip.name}: {score.failure}")
+        elif out is not None:
+            draw(out / f"{clip.name}.png", score)
+        scores.append(score)
+    machine = describe_machine()
+    print_headpose(console, scores)
+    console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
+    write_json(json_file, headpose_report(conditions, scores, machine))
+    failed = sum(score.failure is not None for score in scores)
+    if failed:
+        print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def drawer(out: Path | None) -> Draw:
+    """What draws a clip; the folder is made. Matplotlib is loaded here alone. Raises CommandError where it cannot be done."""
+    if out is None:
+        return lambda _path, _score: None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        from .headpose_plot import draw_heads  # noqa: PLC0415
+    except OSError as error:
+        raise CommandError(f"--out {out}: {error.strerror}") from None
+    except ImportError as error:
+        hint = "pip install 'deixis-evaluation[plots]'"
+        raise CommandError(f"--out draws with matplotlib, which cannot be loaded: {error} ({hint})") from None
+    return draw_heads
+
+
+def _config(stage: str, model: type[C], sets: Mapping[str, Sequence[str]]) -> C:
+    options = CommonOptions(
+        robot="eval",
+        instance=INSTANCE,
+        connect="",
+        lockstep=True,
+        supervised=False,
+        started_before=0,
+        site=None,
+        sets=tuple(sets.get(stage, ())),
+    )
+    try:
+        return load_config(stage, model, options)
+    except ConfigError as error:
+        raise CommandError(str(error)) from None
