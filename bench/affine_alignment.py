@@ -56,10 +56,9 @@ class FacePatch:
         """Yaw in the next frame, degrees; none where the face is not found again."""
         place = (centre[0] + self.offset[0] * self.width_px, centre[1] + self.offset[1] * self.width_px)
         canvas = canvas_of(picture, place, self.width_px)
-        # Once more from the front where it is not found at once: a chain that has gone astray ends there.
         found = align(self.patch, canvas, self.warp, GATE)
-        if found is None:
-            found = align(self.patch, canvas, frontal_warp(), GATE)
+        if found is None:  # a chain that has gone astray ends where the face is seen from the front again
+            found = align(self.patch, canvas, likeliest_warp(self.patch, canvas), GATE)
         if found is None:
             found = align(self.last, canvas, self.warp, CHAIN_GATE)
         if found is None:
@@ -115,6 +114,12 @@ def yaw_of(warp: Array) -> float:
     middle = warp[:, :2] @ ((np.array(PATCH_PX) - 1) / 2) + warp[:, 2] - (CANVAS_PX - 1) / 2
     moved = float(middle @ np.array([down[1], -down[0]])) / scale
     return math.degrees(math.asin(min(max(moved / (RADIUS * FACE_PX * scale), -1.0), 1.0)))
+
+
+def likeliest_warp(patch: Picture, canvas: Picture) -> Array:
+    """The map (2, 3) of the patch's pixels to where the canvas looks most like it, unturned."""
+    place = cv2.minMaxLoc(cv2.matchTemplate(canvas, patch, cv2.TM_CCOEFF_NORMED))[3]
+    return np.hstack([np.eye(2), np.array(place, np.float64)[:, None]])
 
 
 def frontal_warp() -> Array:

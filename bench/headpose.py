@@ -74,7 +74,7 @@ class Material:
 
 @dataclass
 class Methods:
-    """The methods by name; what MediaPipe has said, none where it was not asked. faces, cpu_s: counted over what was run."""
+    """What begins each method, by name: none for those of MediaPipe, whose answers are in `asked` (none: it was not asked)."""
 
     makers: dict[str, Callable[[], Method] | None]
     asked: dict[str, Any] | None

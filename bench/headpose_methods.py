@@ -89,14 +89,16 @@ class Ecc:
         person, centre = track.person_id, _centre(track)
         assert person is not None
         patch = self.patches.get(person)
-        if patch is not None and not patch.is_lost(frame.stamp_ns):
-            return patch.follow(frame.picture, centre, frame.stamp_ns)
+        if patch is not None:
+            yaw = patch.follow(frame.picture, centre, frame.stamp_ns)
+            if yaw is not None or not patch.is_lost(frame.stamp_ns):
+                return yaw
         start = self.starts.setdefault(person, Initialiser(HeadposeConfig().initial_views))
         agreed = start.update(track.frontal, centre, frame.stamp_ns)
         if agreed is None:
             return None
         self.patches[person] = FacePatch.of(frame.picture, centre, agreed.centre_px, agreed.width_px, frame.stamp_ns)
-        del self.starts[person]
+        del self.starts[person]  # the next start needs sightings of its own
         return 0.0
 
 
