@@ -8,12 +8,13 @@ The tracker's core runs once on each clip, and every method sees the same frames
 * ecc: cv2.findTransformECC on the face patch, its turn read off the affine map (affine_alignment.py);
 * facemesh, facemesh_pnp: MediaPipe's FaceMesh, the yaw of its own axes and that of solvePnP on a generic head.
 
-On labelled clips (default: DATA/rendered): mean error of the yaw and share of heads answered, by |true yaw|; silent errors,
-the share of answers that are 20 degrees off or more with a sigma below 10 or with none; processor time by face and frame, on
-one thread, of the method alone. On signers (DATA/asl_clips) MediaPipe is the referee: medians over the clips of the median
-difference from it where it sees less than 45 degrees, of the share of its frames in which the method answers, and of the share
-of differences within the intervals of 68 and 95 %. On drivers (DATA/drivface), labelled in steps of 15 degrees: share of pairs
-of differently labelled pictures of one driver in the right order, and of signs that are right among labels that are not 0.
+* On labelled clips (default: DATA/rendered), by |true yaw|: mean error of the yaw, and share of heads answered; the file has
+  also how far outward the error is. Silent errors: of the answers, those more than 20 degrees off with a sigma below 10, or
+  with none. Processor time by face and frame, of the method alone, on one thread.
+* On signers (DATA/asl_clips), MediaPipe as referee, medians over the clips: median difference from it where it sees less than
+  45 degrees, share of its frames in which the method answers, share of differences within the intervals of 68 and 95 %.
+* On drivers (DATA/drivface), labelled in steps of 15 degrees: share of pairs of differently labelled pictures of one driver in
+  the right order, share of signs right among labels that are not 0, mean error.
 
 MediaPipe runs in an interpreter of its own, with bench/requirements.txt. --out keeps what it said for the next run.
 """
@@ -33,6 +34,7 @@ import cv2
 from deixis_evaluation.chosen_clips import Choice, choose
 from deixis_evaluation.clips import Box, Clip, ClipError
 from deixis_evaluation.machine import describe_machine, say_machine
+from deixis_evaluation.matching import FACE_MARGIN
 from deixis_evaluation.replay import ReplayError
 from deixis_evaluation.seeds import SeedsError
 from deixis_runtime.settings import ConfigError
@@ -139,7 +141,10 @@ def measure_drivers(methods: Methods, drivers: dict[str, list[Labelled]]) -> Mea
         footage = footage_of(driver_source(driver, pictures))
         for name, answers in methods.run(footage).items():
             last = answers.frames[footage.source.shown - 1 :: footage.source.shown]
-            said = [nearest(frame, _middle(one.box), one.box[2] / 2) for frame, one in zip(last, pictures, strict=True)]
+            said = [
+                nearest(frame, _middle(one.box), (0.5 + FACE_MARGIN) * one.box[2])
+                for frame, one in zip(last, pictures, strict=True)
+            ]
             yaws = [None if own is None else own.yaw_deg for own in said]
             pairs[name].append([(one.yaw_deg, yaw) for one, yaw in zip(pictures, yaws, strict=True)])
     return {name: steps(of_method) for name, of_method in pairs.items()}

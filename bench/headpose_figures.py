@@ -27,10 +27,19 @@ Figures = dict[str, float | None]
 
 @dataclass
 class Band:
-    """Frames of heads that are turned so far, and the errors of those answered, degrees."""
+    """Frames of heads that are turned so far; of those answered the errors, and how far they were read too far out, degrees."""
 
     frames: int = 0
     errors_deg: list[float] = field(default_factory=list)
+    outward_deg: list[float] = field(default_factory=list)
+
+    def count(self, true_deg: float, said: Said | None) -> None:
+        """One head in one frame."""
+        self.frames += 1
+        if said is not None:
+            off = (said.yaw_deg - true_deg + 180) % 360 - 180
+            self.errors_deg.append(abs(off))
+            self.outward_deg.append(math.copysign(1.0, true_deg) * off)
 
 
 @dataclass
@@ -43,20 +52,20 @@ class Labels:
 
     def count(self, true_deg: float, said: Said | None) -> None:
         """One head in one frame."""
-        error = None if said is None else angle_error_deg(said.yaw_deg, true_deg)
-        if said is not None and error is not None:
+        if said is not None:
             self.answered += 1
-            self.silent += error > LARGE_ERROR_DEG and (said.sigma_deg is None or said.sigma_deg < SURE_DEG)
+            wrong = angle_error_deg(said.yaw_deg, true_deg) > LARGE_ERROR_DEG
+            self.silent += wrong and (said.sigma_deg is None or said.sigma_deg < SURE_DEG)
         band = next((self.bands[name] for name, (low, high) in BANDS.items() if low <= abs(true_deg) < high), None)
         if band is not None:
-            band.frames += 1
-            band.errors_deg += [] if error is None else [error]
+            band.count(true_deg, said)
 
     def figures(self) -> Figures:
-        """Error and share of answers by band, and share of silent errors among the answers."""
+        """By band: mean error, mean of how far outward it is, share answered. Share of silent errors among the answers."""
         made: Figures = {}
         for name, band in self.bands.items():
             made[f"error_deg_{name}"] = mean(band.errors_deg)
+            made[f"outward_deg_{name}"] = mean(band.outward_deg)
             made[f"answered_share_{name}"] = len(band.errors_deg) / band.frames if band.frames else None
         made["silent_share"] = self.silent / self.answered if self.answered else None
         return made

@@ -79,6 +79,7 @@ def test_errors_are_silent_where_no_large_sigma_warns_of_them() -> None:
     assert figures["silent_share"] == pytest.approx(2 / 4)
     assert figures["error_deg_0-30"] == pytest.approx(30.0)
     assert figures["error_deg_30-60"] == pytest.approx(5.0)
+    assert figures["outward_deg_30-60"] == pytest.approx(-5.0)
     assert figures["error_deg_60-90"] is None
     assert figures["answered_share_90-130"] == 0.0
 
