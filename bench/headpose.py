@@ -12,7 +12,8 @@ The tracker's core runs once on each clip, and every method sees the same frames
   also how far outward the error is. Silent errors: of the answers, those more than 20 degrees off with a sigma below 10, or
   with none. Processor time by face and frame, of the method alone, on one thread.
 * On signers (DATA/asl_clips), MediaPipe as referee, medians over the clips: median difference from it where it sees less than
-  45 degrees, share of its frames in which the method answers, share of differences within the intervals of 68 and 95 %.
+  45 degrees, its constant part and the rest, share of its frames in which the method answers, share of differences within the
+  intervals of 68 and 95 %; and the median difference of the worst clip.
 * On drivers (DATA/drivface), labelled in steps of 15 degrees: share of pairs of differently labelled pictures of one driver in
   the right order, share of signs right among labels that are not 0, mean error.
 
@@ -167,12 +168,15 @@ def clips_table(measured: Measured) -> Table:
 
 def signers_table(measured: Measured) -> Table:
     """A row for each method: medians over the clips."""
-    within = [f"within {percent} %" for percent in INTERVALS]
-    table = _table("Signers, MediaPipe as referee: medians over clips", "difference", "answered", *within, "worst clip")
+    within = [f"in {percent}%" for percent in INTERVALS]
+    columns = ("difference", "offset", "rest", "answered", *within, "worst")
+    table = _table("Signers, MediaPipe as referee: medians over clips", *columns)
     for name, figures in measured.items():
-        shares = [figures["answered_share"], *(figures[f"within_{percent}_share"] for percent in INTERVALS)]
-        worst = max((value for key, value in figures.items() if key.startswith("difference_deg_") and value), default=None)
-        table.add_row(name, _said(figures["difference_deg"]), *(_share(share) for share in shares), _said(worst))
+        if name != MESH:  # which is the referee
+            differences = (figures["difference_deg"], figures["offset_deg"], figures["rest_deg"])
+            shares = (figures["answered_share"], *(figures[f"within_{percent}_share"] for percent in INTERVALS))
+            worst = max((value for key, value in figures.items() if key.startswith("difference_deg_") and value), default=None)
+            table.add_row(name, *(_said(one) for one in differences), *(_share(share) for share in shares), _said(worst))
     return table
 
 

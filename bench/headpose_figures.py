@@ -98,8 +98,9 @@ def middle_of(said: Said) -> Point:
 def agreement(frames: Sequence[list[Said]], referee: Sequence[list[Said]]) -> Figures:
     """One clip of one person against the referee's largest face.
 
-    difference_deg: median, where the referee sees less than REFEREED_DEG. within_N_share: of these, of the intervals meant
-    to hold N per cent.
+    difference_deg: median, where the referee sees less than REFEREED_DEG. offset_deg, rest_deg: its constant part, which comes
+    of how the head was begun, and the median of what is left. within_N_share: of these, of the intervals meant to hold N per
+    cent.
     """
     pairs: list[tuple[Said, float]] = []
     asked = answered = 0
@@ -111,17 +112,20 @@ def agreement(frames: Sequence[list[Said]], referee: Sequence[list[Said]]) -> Fi
         if own is not None:
             answered += 1
             if abs(judged[0].yaw_deg) < REFEREED_DEG:
-                pairs.append((own, angle_error_deg(own.yaw_deg, judged[0].yaw_deg)))
+                pairs.append((own, (own.yaw_deg - judged[0].yaw_deg + 180) % 360 - 180))
+    offset = median(off for _, off in pairs) if pairs else None
     made: Figures = {
-        "difference_deg": median(error for _, error in pairs) if pairs else None,
+        "difference_deg": median(abs(off) for _, off in pairs) if pairs else None,
+        "offset_deg": None if offset is None else abs(offset),
+        "rest_deg": None if offset is None else median(abs(off - offset) for _, off in pairs),
         "answered_share": answered / asked if asked else None,
     }
     return made | {f"within_{percent}_share": coverage(pairs, width) for percent, width in INTERVALS.items()}
 
 
 def coverage(pairs: Sequence[tuple[Said, float]], width: float) -> float | None:
-    """Share of errors (degrees) within `width` sigma of their answers; none where no answer has a sigma."""
-    held = [error <= width * said.sigma_deg for said, error in pairs if said.sigma_deg is not None]
+    """Share of signed errors (degrees) within `width` sigma of their answers; none where no answer has a sigma."""
+    held = [abs(error) <= width * said.sigma_deg for said, error in pairs if said.sigma_deg is not None]
     return sum(held) / len(held) if held else None
 
 

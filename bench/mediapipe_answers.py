@@ -28,14 +28,14 @@ def ask(sources: list[Source], python: Path | None, out: Path | None) -> dict[st
     python: interpreter that has MediaPipe; none for this one. out: folder of what was said before. Raises RefereeError.
     """
     kept = _kept(out)
-    jobs = {item.name: _job(item) for item in sources}
-    open_jobs = {name: job for name, job in jobs.items() if kept.get(name, {}).get("job") != job}
-    if open_jobs:
-        answers = _run(open_jobs, python)
-        kept |= {name: {"job": open_jobs[name], **answer} for name, answer in answers.items()}
+    known = {source.name: _identity(source) for source in sources}
+    new = [source for source in sources if kept.get(source.name, {}).get("of") != known[source.name]]
+    if new:
+        answers = _run({source.name: _job(source) for source in new}, python)
+        kept |= {name: {"of": known[name], **answer} for name, answer in answers.items()}
         if out is not None:
             (out / KEPT).write_text(json.dumps(kept), encoding="utf-8")
-    return {name: kept[name] for name in jobs}
+    return {name: kept[name] for name in known}
 
 
 def answers_of(method: str, footage: Footage, asked: dict[str, Any]) -> Answers:
@@ -54,10 +54,14 @@ def _said(face: dict[str, Any], yaw: str) -> Said:
 
 
 def _job(source: Source) -> dict[str, Any]:
-    """What the referee is told; size and time of the files say whether what is kept still holds."""
+    return {"paths": [str(path) for path in source.paths], "focal_px": source.focal_px}
+
+
+def _identity(source: Source) -> dict[str, Any]:
+    """What tells whether that which is kept is of the same pictures, wherever they lie."""
     stats = [path.stat() for path in source.paths]
     return {
-        "paths": [str(path) for path in source.paths],
+        "files": [path.name for path in source.paths],
         "focal_px": source.focal_px,
         "bytes": sum(stat.st_size for stat in stats),
         "changed_ns": max(stat.st_mtime_ns for stat in stats),

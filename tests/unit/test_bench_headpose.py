@@ -52,7 +52,7 @@ def test_labels_in_steps_count_signs_only_of_turned_heads_and_order_only_within_
 def test_intervals_cover_the_differences_that_lie_within_them() -> None:
     from headpose_figures import coverage
 
-    pairs = [(said(0, 2.0), 1.0), (said(0, 2.0), 3.0), (said(0, 2.0), 5.0), (said(0), 90.0)]
+    pairs = [(said(0, 2.0), 1.0), (said(0, 2.0), -3.0), (said(0, 2.0), 5.0), (said(0), 90.0)]
     assert coverage(pairs, 1.0) == pytest.approx(1 / 3)
     assert coverage(pairs, 1.96) == pytest.approx(2 / 3)
     assert coverage(pairs[3:], 1.0) is None
@@ -67,6 +67,15 @@ def test_agreement_asks_only_where_the_referee_sees_a_face_and_differs_only_wher
     assert figures["difference_deg"] == pytest.approx(2.0)
     assert figures["answered_share"] == pytest.approx(2 / 4)
     assert figures["within_68_share"] == 1.0
+
+
+def test_a_constant_difference_is_told_from_the_rest() -> None:
+    from headpose_figures import agreement
+
+    own, referee = [2.0, 3.0, 12.0, -8.0], [10.0, 10.0, 21.0, 0.0]
+    figures = agreement([[said(yaw)] for yaw in own], [[said(yaw)] for yaw in referee])
+    assert figures["difference_deg"] == figures["offset_deg"] == pytest.approx(8.0)
+    assert figures["rest_deg"] == pytest.approx(0.5)
 
 
 def test_errors_are_silent_where_no_large_sigma_warns_of_them() -> None:
