@@ -22,8 +22,8 @@ FACE_PX = 64
 CANVAS_PX = 160
 PATCH_PX = (46, 58)
 """Width and height of the patch: within the face, so that nothing behind it is aligned."""
-RADIUS = 0.60
-"""Of the head about its vertical axis at the patch, face widths, so that rendered heads are read right below 60 degrees."""
+RADIUS = 0.56
+"""How far a turn by one radian moves the patch, face widths: fitted to rendered heads, as are the gates."""
 GATE, CHAIN_GATE = 0.90, 0.80
 """Correlation below which the first view does not do, and below which the last frame does not do either."""
 LEAST_SQUEEZE = 0.12
@@ -104,16 +104,17 @@ def squeeze_of(warp: Array) -> float:
 
 
 def yaw_of(warp: Array) -> float:
-    """Yaw of a patch, degrees: its sine is how far the patch has moved from the head's axis.
+    """Yaw of a patch, degrees, by how far the patch has moved from the head's axis.
 
-    Roll and distance drop out, being those of the patch's vertical. How narrow the patch has become is not used: it is the
-    same on either side, and a face is no plane, so that its patch is half as wide at 38 degrees already.
+    In proportion, not by the sine: the patch moves on toward the half of the face that is still seen. Roll and distance drop
+    out, being those of the patch's vertical. How narrow the patch has become is not used: it is the same on either side, and a
+    face is no plane, so that its patch is half as wide at 38 degrees already.
     """
     down = warp[:, 1]
     scale = float(np.linalg.norm(down))
     middle = warp[:, :2] @ ((np.array(PATCH_PX) - 1) / 2) + warp[:, 2] - (CANVAS_PX - 1) / 2
     moved = float(middle @ np.array([down[1], -down[0]])) / scale
-    return math.degrees(math.asin(min(max(moved / (RADIUS * FACE_PX * scale), -1.0), 1.0)))
+    return math.degrees(moved / (RADIUS * FACE_PX * scale))
 
 
 def likeliest_warp(patch: Picture, canvas: Picture) -> Array:

@@ -153,9 +153,9 @@ def measure_drivers(methods: Methods, drivers: dict[str, list[Labelled]]) -> Mea
 
 def clips_table(measured: Measured) -> Table:
     """A row for each method: error and share answered by band, silent errors, time."""
-    table = _table("Labelled clips: error (answered) by |true yaw|", *BANDS, "silent", "ms", "ratio")
+    table = _table("Labelled clips: error and share answered by |true yaw|", *BANDS, "silent", "ms", "ratio")
     for name, figures in measured.items():
-        bands = [f"{_said(figures[f'error_deg_{band}'])} ({_share(figures[f'answered_share_{band}'])})" for band in BANDS]
+        bands = [f"{_said(figures[f'error_deg_{band}'])} {_share(figures[f'answered_share_{band}']):>4}" for band in BANDS]
         silent = figures["silent_share"]
         rest = (
             "-" if silent is None else f"{100 * silent:.1f}%",
@@ -190,7 +190,7 @@ def drivers_table(measured: Measured) -> Table:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("method", no_wrap=True)
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)

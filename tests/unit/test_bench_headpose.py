@@ -103,7 +103,7 @@ def warp_of(yaw_deg: float, roll_deg: float = 0.0, scale: float = 1.0) -> np.nda
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
     turn = np.array([[math.cos(roll), -math.sin(roll)], [math.sin(roll), math.cos(roll)]])
     linear = scale * turn @ np.diag([math.cos(yaw), 1.0])
-    shift = scale * turn @ np.array([alignment.RADIUS * alignment.FACE_PX * math.sin(yaw), 0.0])
+    shift = scale * turn @ np.array([alignment.RADIUS * alignment.FACE_PX * yaw, 0.0])
     middle = (np.array(alignment.PATCH_PX) - 1) / 2
     return np.hstack([linear, (shift + (alignment.CANVAS_PX - 1) / 2 - linear @ middle)[:, None]])
 
