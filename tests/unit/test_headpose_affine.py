@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from deixis_headpose.affine import (
+    CONVERGED_PX,
     PatchMatch,
     border_weights,
     design_matrix,
@@ -74,7 +75,8 @@ def test_mirrored_pictures_give_mirrored_parameters(change: np.ndarray) -> None:
     flipped = levels_of(np.fliplr(picture_of(start)))
     found = match_patch(levels_of(then), take_template(first, start), start).parameters
     mirrored = match_patch(levels_of(np.fliplr(then)), take_template(flipped, start), start).parameters
-    assert mirrored == pytest.approx(mirror * found + np.array([159.0, 0, 0, 0, 0, 0]), abs=0.02)
+    # Either may stop so far from where the steps would end.
+    assert mirrored == pytest.approx(mirror * found + np.array([159.0, 0, 0, 0, 0, 0]), abs=2 * CONVERGED_PX)
 
 
 @settings(max_examples=15, deadline=None)
