@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from deixis_runtime.settings import StageConfig
 from pydantic import Field
 
@@ -9,6 +11,10 @@ from pydantic import Field
 class HeadposeConfig(StageConfig):
     """Settings of the headpose stage; defaults are for adults one to four metres from a VGA camera."""
 
+    method: Literal["ellipsoid", "affine"] = Field(
+        default="ellipsoid",
+        description="How heads are followed: by keyframes of a textured ellipsoid, or by the paper's chain of affine matches.",
+    )
     max_persons: int = Field(default=3, ge=1, le=16, description="Heads matched per frame, largest first; bounds the work.")
     frames_kept: int = Field(default=6, ge=1, le=64, description="Last frames kept to be joined with their tracks.")
     horizontal_fov_deg: float = Field(

@@ -10,9 +10,13 @@ from deixis_schemas.messages import HeadPose, Track
 from deixis_schemas.runs import RunClock
 from numpy.typing import NDArray
 
+from .affine_head import AffineHead
 from .config import HeadposeConfig
 from .head import ellipsoid
 from .tracked_head import Sight, TrackedHead, centre_of
+
+METHODS: dict[str, type[TrackedHead] | type[AffineHead]] = {"ellipsoid": TrackedHead, "affine": AffineHead}
+"""What follows one head, by the setting `method`."""
 
 
 class HeadPoseEstimator:
@@ -22,7 +26,8 @@ class HeadPoseEstimator:
         self._config = config
         self._clock = RunClock()
         self._surface = ellipsoid(config.head_semi_axes_m, config.surface_points, highest=-0.92, lowest=0.85)
-        self._heads: dict[int, TrackedHead] = {}
+        self._head_of_method = METHODS[config.method]
+        self._heads: dict[int, TrackedHead | AffineHead] = {}
         self._seen_ns: dict[int, int] = {}
 
     def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], lens: Lens, run: int, stamp_ns: int) -> list[HeadPose]:
@@ -46,7 +51,7 @@ class HeadPoseEstimator:
     def _estimate(self, face: Track, hands: Sequence[Track], image: NDArray[np.uint8], lens: Lens, now_ns: int) -> HeadPose:
         person = face.person_id
         assert person is not None
-        head = self._heads.setdefault(person, TrackedHead(self._config, self._surface))
+        head = self._heads.setdefault(person, self._head_of_method(self._config, self._surface))
         self._seen_ns[person] = now_ns
         camera = lens.pinhole_at(centre_of(face), (image.shape[1], image.shape[0]))
         return head.update(Sight(image, camera, face, hands, now_ns)).of_person(person)

@@ -136,7 +136,7 @@ def _solve(observation: Observation, templates: Sequence[Template], prior: Prior
 
 def _pose_equations(by_pose: Array, f: Array, g: Array, weights: Array) -> tuple[Array, Array]:
     """Normal equations (6, 6) and right side (6,) of the pose by one template, its gain and offset eliminated."""
-    gain, offset = _radiometric(f, g, weights)
+    gain, offset = radiometric_correction(f, g, weights)
     residual = gain * f + offset - g
     size = np.abs(residual)
     noise = max(1.4826 * float(np.partition(size, len(size) // 2)[len(size) // 2]), MIN_NOISE)
@@ -150,8 +150,8 @@ def _pose_equations(by_pose: Array, f: Array, g: Array, weights: Array) -> tuple
     return normal, right
 
 
-def _radiometric(f: Array, g: Array, weights: Array) -> tuple[float, float]:
-    """Gain and offset that bring template f to picture g (the paper: radiometric correction first)."""
+def radiometric_correction(f: Array, g: Array, weights: Array) -> tuple[float, float]:
+    """Gain and offset that bring template f to picture g (the paper: radiometric correction first); all (N,)."""
     total = weights.sum()
     mean_f, mean_g = weights @ f / total, weights @ g / total
     spread = weights @ (f - mean_f) ** 2
@@ -165,10 +165,17 @@ def _correlation(observation: Observation, template: Template) -> tuple[float, f
     total = float(weights.sum())
     if np.count_nonzero(weights) < MIN_POINTS:
         return 0.0, total
-    f = values - weights @ values / total
-    g = observation.values - weights @ observation.values / total
+    return pearson(values, observation.values, weights), total
+
+
+def pearson(f: Array, g: Array, weights: Array) -> float:
+    """Pearson's correlation of grey values f and g (N,), weighted (N,); 0 where one of them does not vary or nothing counts."""
+    total = float(weights.sum())
+    if total <= 0:
+        return 0.0
+    f, g = f - weights @ f / total, g - weights @ g / total
     spread = float((weights @ f**2) * (weights @ g**2))
-    return float(weights @ (f * g)) / spread**0.5 if spread > 1e-9 else 0.0, total
+    return float(weights @ (f * g)) / spread**0.5 if spread > 1e-9 else 0.0
 
 
 def _bounded(step: Array) -> Array:
