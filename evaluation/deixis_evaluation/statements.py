@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import cv2
 import numpy as np
-from deixis_schemas.messages import Belief, Gestures, HeadPoses, Message, OfFrame, Target, Track, Tracks
+from deixis_schemas.messages import Belief, Gestures, HeadPose, HeadPoses, Message, OfFrame, Target, Track, Tracks
 
 Value = str | float | tuple[float, ...]
 Stated = dict[str, dict[str, Value]]
@@ -62,13 +62,26 @@ def _area(contour: bytes) -> float:
 
 def _say_poses(message: HeadPoses) -> Stated:
     persons = {f"person {pose.person_id}": pose for pose in message.poses}
+    stated = {name: sigmas for name, pose in persons.items() if (sigmas := _sigmas(pose)) is not None}
     return {
         "persons": {"the frame": _names(persons)},
         "status": {name: pose.status for name, pose in persons.items()},
         "side": {name: pose.side or "not said" for name, pose in persons.items()},
         "yaw_deg": {name: pose.yaw_deg for name, pose in persons.items() if pose.yaw_deg is not None},
         "yaw_sigma_deg": {name: pose.yaw_sigma_deg for name, pose in persons.items() if pose.yaw_sigma_deg is not None},
+        "pitch_deg": {name: pose.pitch_deg for name, pose in persons.items() if pose.pitch_deg is not None},
+        "roll_deg": {name: pose.roll_deg for name, pose in persons.items() if pose.roll_deg is not None},
+        "pitch_sigma_deg": {name: sigmas[1] for name, sigmas in stated.items()},
+        "roll_sigma_deg": {name: sigmas[2] for name, sigmas in stated.items()},
     }
+
+
+def _sigmas(pose: HeadPose) -> tuple[float, float, float] | None:
+    """Of yaw, pitch and roll, degrees; none where the covariance is not stated."""
+    if pose.covariance_deg2 is None:
+        return None
+    of_yaw, _, _, of_pitch, _, of_roll = pose.covariance_deg2
+    return of_yaw**0.5, of_pitch**0.5, of_roll**0.5
 
 
 def _say_gestures(message: Gestures) -> Stated:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from deixis_headpose.tracked_head import yaw_sigma_deg
+from deixis_headpose.ellipsoid_head import yaw_sigma_deg
 from deixis_schemas import topics
 from deixis_schemas.messages import HeadPose, HeadPoses, Message, Tracks
 
@@ -12,7 +12,7 @@ from .clips import TruePerson, Truth
 from .speaker import producer_of
 from .tracked_persons import TrackedPersons
 
-RANGE_DEG = 95.0
+RANGE_DEG = 130.0
 """Beyond this the truth says `out_of_range`, as headpose does and fusion expects."""
 
 

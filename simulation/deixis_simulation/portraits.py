@@ -22,6 +22,7 @@ from .draw_bodies import draw_bodies
 from .draw_lens import Overrides, draw_sensor
 from .geometry import Floats, View, robot_at, view_at
 from .lights import lighting
+from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
 from .rotations import about, turn, unit
 from .scene import Light, Scene, Sensor
@@ -60,17 +61,20 @@ class Portrait:
     breadth_px: float
 
 
-def portraits(seed: int, avatars: Sequence[str], count: int) -> Iterator[Portrait]:
-    """So many portraits of people made from these avatars; the same for the same arguments. Raises RenderError."""
+def portraits(seed: int, avatars: Sequence[str], count: int, rooms: int = ROOMS) -> Iterator[Portrait]:
+    """So many portraits of people made from these avatars, in so many rooms; the same for the same arguments.
+
+    Raises RenderError.
+    """
     rng = np.random.default_rng(seed)
-    scenes = _scenes(rng)
-    rooms = [_empty_room(scene) for scene in scenes]
+    scenes = _scenes(rng, rooms)
+    behind = [_empty_room(scene) for scene in scenes]
     studios: dict[str, Renderer] = {}
     made = 0
     try:
         while made < count:
             scene = scenes[int(rng.integers(len(scenes)))]
-            for portrait in _sitting(rng, avatars, scene, rooms, studios, min(VIEWS, count - made)):
+            for portrait in _sitting(rng, avatars, scene, behind, studios, min(VIEWS, count - made)):
                 made += 1
                 yield portrait
     finally:
@@ -195,9 +199,9 @@ def _portrait(rng: np.random.Generator, picture: Picture, skeleton: Skeleton, me
     places, breadth_m = _landmarks(body.avatar, skeleton, mesh)
     depth = float(view.in_camera(centre)[2])
     if rng.random() < _GLASSES:
-        picture = _with_glasses(rng, picture, skeleton, view)
+        picture = with_glasses(rng, picture, skeleton, view)
     if rng.random() < _HANDS:
-        picture = _with_something_before(rng, picture)
+        picture = with_something_before(rng, picture)
     return Portrait(
         picture=picture,
         rotation=MIRROR @ in_camera @ MIRROR,
@@ -227,46 +231,7 @@ def _landmarks(avatar: Avatar, skeleton: Skeleton, mesh: Mesh) -> tuple[Floats, 
     return np.array([found[name] for name in LANDMARKS]), breadth
 
 
-# --- what is before and behind --------------------------------------------------------------------------------------------
-
-
-def _with_glasses(rng: np.random.Generator, picture: Picture, skeleton: Skeleton, view: View) -> Picture:
-    """Rims around the eyes and the near arm of the glasses: drawn, not rendered, which at this size looks the same."""
-    head = skeleton.rotation("Head")
-    scale = skeleton.body.head_scale
-    angle = np.linspace(0, 2 * np.pi, 17)
-    wide, high = rng.uniform(0.02, 0.029), rng.uniform(0.014, 0.025)
-    rim = np.stack([wide * np.cos(angle), high * np.sin(angle), np.full(17, 0.022)], axis=1)
-    toward = unit(view.centre - skeleton.position("Head")) @ head
-    colour = tuple(int(v) for v in rng.integers(0, 90, 3))
-    thick = int(rng.integers(1, 3))
-    drawn = picture.copy()
-    for bone, side in (("RightEye", -1.0), ("LeftEye", 1.0)):
-        eye = skeleton.position(bone)
-        if toward[2] > -0.1 and toward @ unit([side * 0.5, 0, 1.0]) > -0.05:
-            ring = view.project(eye + (rim * scale) @ head.T)
-            if rng.random() < 0.3:
-                shade = drawn.copy()
-                cv2.fillPoly(shade, [np.round(ring).astype(np.int32)], colour)
-                drawn = cv2.addWeighted(shade, 0.7, drawn, 0.3, 0)
-            cv2.polylines(drawn, [np.round(ring * 8).astype(np.int32)], True, colour, thick, cv2.LINE_AA, 3)
-        if toward[0] * side > 0.15:
-            arm = np.array([[side * 0.03, 0.005, 0.02], [side * 0.042, 0.004, -0.075]]) * scale
-            line = view.project(eye + arm @ head.T)
-            cv2.polylines(drawn, [np.round(line * 8).astype(np.int32)], False, colour, thick, cv2.LINE_AA, 3)
-    return np.asarray(drawn, np.uint8)
-
-
-def _with_something_before(rng: np.random.Generator, picture: Picture) -> Picture:
-    """A hand, an arm or a thing that covers a part."""
-    drawn = picture.copy()
-    colour = picture[tuple(rng.integers(20, 76, 2))] if rng.random() < 0.6 else rng.integers(0, 256, 3)
-    centre, axes = rng.uniform(15, 81, 2), rng.uniform(6, 20, 2)
-    mask = np.zeros(picture.shape[:2], np.uint8)
-    cv2.ellipse(mask, (tuple(centre), tuple(2 * axes), float(rng.uniform(0, 180))), 255, -1)
-    soft = (cv2.GaussianBlur(mask, (0, 0), 0.8) / 255.0)[..., None]
-    shaded = np.asarray(colour, float) * np.linspace(*rng.uniform(0.7, 1.2, 2), SIDE_PX)[:, None, None]
-    return np.asarray(np.clip(drawn * (1 - soft) + shaded * soft, 0, 255), np.uint8)
+# --- behind the person ---------------------------------------------------------------------------------------------------
 
 
 def _background(rng: np.random.Generator, rooms: Sequence[FloatPicture]) -> FloatPicture:
@@ -277,9 +242,9 @@ def _background(rng: np.random.Generator, rooms: Sequence[FloatPicture]) -> Floa
     return np.asarray(cv2.resize(part, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _scenes(rng: np.random.Generator) -> list[Scene]:
+def _scenes(rng: np.random.Generator, count: int) -> list[Scene]:
     """Scenes whose empty rooms, lights and cameras the portraits are taken in; of fitting seeds."""
-    seeds = rng.choice(HELD_OUT_FROM_SEED, ROOMS, replace=False)
+    seeds = rng.choice(HELD_OUT_FROM_SEED, count, replace=False)
     return [draw_scene(int(seed), 0, overrides=Overrides(size=ROOM_SIZE)) for seed in seeds]
 
 

@@ -140,7 +140,7 @@ class Renderer:
 
     def take_over(self) -> None:
         """Make this the renderer that draws, where a process has several: OpenGL goes by the thread, not by the object."""
-        self._context.__enter__()
+        self._context.__enter__()  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
         """Give the context's memory back."""

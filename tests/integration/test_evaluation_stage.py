@@ -39,11 +39,11 @@ def test_a_clip_is_scored_drawn_and_told_the_same_each_time(tmp_path: Path, clip
 def test_true_tracks_stand_in_and_settings_reach_the_stage(tmp_path: Path, clips: Path) -> None:
     scores = tmp_path / "scores.json"
     arguments = ("--stage", "headpose", clips, "--only-clips", "small", "--truth", "tracker", "--json", scores)
-    done = evaluate(*arguments, "--set", "headpose.initial_views=30")
+    done = evaluate(*arguments, "--set", "headpose.method=ellipsoid", "--set", "headpose.initial_views=30")
     assert done.returncode == 0, done.stderr
     content = json.loads(scores.read_text())
     assert content["truth"] == ["tracker"]
-    assert content["settings"] == {"headpose": ["initial_views=30"]}
+    assert content["settings"] == {"headpose": ["method=ellipsoid", "initial_views=30"]}
     status = content["summary"]["heads"]["status"]
     assert (status["absent"], status["initialising"] >= 29) == (0, True)
 

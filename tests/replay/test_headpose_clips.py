@@ -49,21 +49,27 @@ def replay(folder: Path, name: str, frames: int) -> list[tuple[float, HeadPose]]
     return answers
 
 
-# The second person looks 15 % narrower to the tracker, which serves better (6 degrees) than the width by the truth.
-@pytest.mark.parametrize(("name", "within_deg"), [("c11_point_p60", 12), ("c05_point_m45", 14)])
+@pytest.mark.parametrize(("name", "within_deg"), [("c11_point_p60", 6), ("c05_point_m45", 6)])
 def test_the_yaw_follows_a_fast_turn_toward_a_poi(rendered: Path, name: str, within_deg: float) -> None:
     answers = replay(rendered, name, 62)
-    assert sum(pose.status == "tracking" for _, pose in answers) > 55
+    assert sum(pose.status == "tracking" for _, pose in answers) > 60
     errors = [abs(pose.yaw_deg - truth) for truth, pose in answers if pose.yaw_deg is not None]
     turned = [abs(pose.yaw_deg - truth) for truth, pose in answers[50:] if pose.yaw_deg is not None]
-    assert np.mean(errors) < 5
+    assert np.mean(errors) < 4
     assert np.mean(turned) < within_deg
 
 
-def test_a_head_turned_far_away_is_out_of_range_on_its_side(rendered: Path) -> None:
+def test_a_head_turned_far_away_is_read_as_far_or_out_of_range_on_its_side(rendered: Path) -> None:
     far = [pose for truth, pose in replay(rendered, "c14_point_p130", 56) if truth > 110]
     assert len(far) > 5
-    assert all((pose.status, pose.side) == ("out_of_range", "left") for pose in far)
+    assert all((pose.yaw_deg or 0) > 90 or (pose.status, pose.side) == ("out_of_range", "left") for pose in far)
+
+
+def test_a_walker_who_never_faces_the_camera_is_read_all_the_way(rendered: Path) -> None:
+    answers = replay(rendered, "g01_walk_rl", 60)
+    errors = [abs(pose.yaw_deg - truth) for truth, pose in answers if pose.yaw_deg is not None]
+    assert len(errors) > 0.85 * len(answers)  # at first its head is not in the picture
+    assert np.mean(errors) < 12
 
 
 def test_two_runs_give_equal_answers(rendered: Path) -> None:

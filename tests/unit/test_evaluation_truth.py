@@ -88,7 +88,7 @@ def frame(seq: int) -> Frame:
 
 @pytest.mark.parametrize(
     ("yaw", "status", "side"),
-    [(0.0, "tracking", None), (-95.0, "tracking", None), (96.0, "out_of_range", "left"), (-130.0, "out_of_range", "right")],
+    [(0.0, "tracking", None), (-130.0, "tracking", None), (131.0, "out_of_range", "left"), (-150.0, "out_of_range", "right")],
 )
 def test_a_true_head_has_its_yaw_within_the_range_and_its_side_beyond(yaw: float, status: str, side: str | None) -> None:
     (heads,) = TrueHeads(truth(person(**turned(yaw)))).hear(tracks((7, 321.0)))

@@ -275,11 +275,11 @@ def test_pointing_and_looking_at_a_poi_names_it_once(poi_id: str, bearing: float
     assert scene.targets[-1] is final
 
 
-def test_a_head_out_of_range_and_the_hand_name_a_poi_behind() -> None:
+def test_a_head_turned_far_and_the_hand_name_a_poi_behind() -> None:
     scene = Scene()
     scene.show(15, REST, pose(0))
     hand = gesture("point_left", bearing_deg=60, bearing_sigma_deg=10, bearing_mirrored=True)
-    scene.show(45, hand, pose(None, "out_of_range", side="left"))
+    scene.show(45, hand, pose(115))
     scene.show(20, REST, pose(0))
     assert scene.finals[0].poi_ids == ["i"]
 

@@ -134,7 +134,8 @@ def test_a_yaw_that_fits_no_poi_is_ignorance_not_the_least_bad_poi() -> None:
 
 @pytest.mark.parametrize(("side", "expected"), [("left", {130.0, 105.0}), ("right", {-130.0, -105.0})])
 def test_out_of_range_means_the_far_pois_on_that_side(side: Side, expected: set[float]) -> None:
-    pignistic = head_assignment(HeadObservation(None, side=side), seen(*AROUND), CONFIG.head).pignistic()
+    narrow = CONFIG.head.model_copy(update={"range_deg": 95})  # as of a guest that reads heads less far
+    pignistic = head_assignment(HeadObservation(None, side=side), seen(*AROUND), narrow).pignistic()
     order = sorted(range(len(AROUND)), key=lambda i: -pignistic[i])
     assert {AROUND[i] for i in order[:2]} == expected
 

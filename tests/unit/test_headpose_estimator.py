@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 from deixis_headpose.config import HeadposeConfig
+from deixis_headpose.ellipsoid_head import yaw_sigma_deg
 from deixis_headpose.estimator import HeadPoseEstimator
 from deixis_headpose.head import Pose
-from deixis_headpose.tracked_head import yaw_sigma_deg
 from deixis_schemas.messages import HeadPose, KindProbabilities, Track
 from hypothesis import given
 from hypothesis import strategies as st
@@ -34,7 +34,7 @@ def a_turn(rate_hz: float) -> list[tuple[float, Pose]]:
 
 
 def answers(poses: list[Pose], stamps_ns: list[int], runs: list[int] | None = None) -> list[HeadPose]:
-    estimator = HeadPoseEstimator(HeadposeConfig())
+    estimator = HeadPoseEstimator(HeadposeConfig(method="ellipsoid"))
     runs = runs or [1] * len(poses)
     return [
         estimator.update(painted_head(pose), [face_of(pose)], LENS, run, stamp)[0]
@@ -43,17 +43,17 @@ def answers(poses: list[Pose], stamps_ns: list[int], runs: list[int] | None = No
 
 
 def test_a_picture_without_persons_gives_no_heads() -> None:
-    assert HeadPoseEstimator(HeadposeConfig()).update(GREY, [], LENS, 1, 0) == []
+    assert HeadPoseEstimator(HeadposeConfig(method="ellipsoid")).update(GREY, [], LENS, 1, 0) == []
 
 
 def test_a_face_that_is_never_seen_from_the_front_stays_initialising() -> None:
-    estimator = HeadPoseEstimator(HeadposeConfig())
+    estimator = HeadPoseEstimator(HeadposeConfig(method="ellipsoid"))
     statuses = {estimator.update(GREY, [face(4, 100, 50)], LENS, 1, k)[0].status for k in range(8)}
     assert statuses == {"initialising"}
 
 
 def test_only_the_largest_heads_are_estimated() -> None:
-    estimator = HeadPoseEstimator(HeadposeConfig(max_persons=2))
+    estimator = HeadPoseEstimator(HeadposeConfig(method="ellipsoid", max_persons=2))
     poses = estimator.update(GREY, [face(1, 10, 30), face(2, 100, 60), face(3, 200, 45)], LENS, 1, 0)
     assert [pose.person_id for pose in poses] == [2, 3]
 
@@ -92,7 +92,7 @@ def test_another_run_of_the_camera_starts_all_heads_anew() -> None:
 
 
 def test_a_head_lost_starts_anew_where_it_is_seen_from_the_front_again() -> None:
-    estimator, noise = HeadPoseEstimator(HeadposeConfig()), np.random.default_rng(2)
+    estimator, noise = HeadPoseEstimator(HeadposeConfig(method="ellipsoid")), np.random.default_rng(2)
     here, there = turned_to(0.0), turned_to(0.0, (0.2, 0.0, 2.0))
     stamps = iter(range(0, 10**10, FRAME_NS))
     for _ in range(4):
@@ -111,7 +111,7 @@ def test_a_head_lost_starts_anew_where_it_is_seen_from_the_front_again() -> None
 @pytest.mark.parametrize("shape", [(10, 10, 4), (10,)])
 def test_a_picture_of_another_shape_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="image: needs uint8"):
-        HeadPoseEstimator(HeadposeConfig()).update(np.zeros(shape, np.uint8), [], LENS, 1, 0)
+        HeadPoseEstimator(HeadposeConfig(method="ellipsoid")).update(np.zeros(shape, np.uint8), [], LENS, 1, 0)
 
 
 def test_an_unknown_setting_is_refused_by_name() -> None:

@@ -54,7 +54,7 @@ class HandConfig(StageConfig):
 class HeadConfig(StageConfig):
     """The `deixis` rules for the head."""
 
-    range_deg: float = Field(default=95, gt=0, le=180, description="Yaw beyond which a head is out of range.")
+    range_deg: float = Field(default=130, gt=0, le=180, description="Yaw beyond which headpose says out of range.")
     range_soft_deg: float = Field(default=10, gt=0, le=90, description="Width of the border of that range.")
     sigma_deg: float = Field(default=4, gt=0, le=90, description="How exactly people turn the head.")
     gain_min: float = Field(default=0.65, gt=0, le=1.5, description="Smallest part of the way that heads turn.")

@@ -23,12 +23,13 @@ from deixis_schemas.messages import FrontalFace, Point, Side
 
 from .affine import match_patch, refusal, take_template, transform
 from .config import HeadposeConfig
+from .ellipsoid_head import FARTHEST_DEG, MOVED_ON_S, SAME_PLACE_M, WALKING_M_S
 from .head import Array, Surface
 from .initialise import Initialiser, frontal_pose
 from .neck import LEVER_M
 from .patch import Level, pyramid
+from .sight import HeadState, Sight, centre_of
 from .sphere import angle_of_edges
-from .tracked_head import MOVED_ON_S, SAME_PLACE_M, WALKING_M_S, HeadState, Sight, centre_of
 
 HALF_WIDTH, HALF_HEIGHT = 0.7, 0.9
 """Size of a new patch, half widths of the head: the part of the face that is nearly a plane to the camera."""
@@ -73,7 +74,7 @@ class Chain:
 
 
 class AffineHead:
-    """Tracks one head by a chain of affine matches; has the face of `TrackedHead`."""
+    """Tracks one head by a chain of affine matches; has the face of `EllipsoidHead`."""
 
     def __init__(self, config: HeadposeConfig, _surface: Surface) -> None:
         self._config = config
@@ -191,7 +192,7 @@ class AffineHead:
         longitude, latitude, roll = (float(angle) for angle in np.degrees(chain.angles))
         if (now_ns - chain.matched_ns) * 1e-9 > self._config.hold_s:
             return HeadState("lost")
-        if abs(longitude) > self._config.range_deg:
+        if abs(longitude) > min(self._config.range_deg, FARTHEST_DEG):
             return HeadState("out_of_range", side=_side(longitude))
         return HeadState("tracking", (longitude, -latitude, roll), self._sigma_deg(chain, now_ns))
 

@@ -11,9 +11,10 @@ from pydantic import Field
 class HeadposeConfig(StageConfig):
     """Settings of the headpose stage; defaults are for adults one to four metres from a VGA camera."""
 
-    method: Literal["ellipsoid", "affine"] = Field(
-        default="ellipsoid",
-        description="How heads are followed: by keyframes of a textured ellipsoid, or by the paper's chain of affine matches.",
+    method: Literal["regression", "ellipsoid", "affine"] = Field(
+        default="regression",
+        description="How heads are read: each look by itself, absolute; by keyframes of a textured ellipsoid, from a frontal "
+        "view on; or by the paper's chain of affine matches.",
     )
     max_persons: int = Field(default=3, ge=1, le=16, description="Heads matched per frame, largest first; bounds the work.")
     frames_kept: int = Field(default=6, ge=1, le=64, description="Last frames kept to be joined with their tracks.")
@@ -44,12 +45,20 @@ class HeadposeConfig(StageConfig):
     search_gate: float = Field(default=0.90, gt=0, lt=1, description="Correlation below which other starts are tried as well.")
     keyframe_gate: float = Field(default=0.82, gt=0, lt=1, description="Correlation needed to take a keyframe.")
 
-    range_deg: float = Field(default=100.0, gt=30, le=150, description="Yaw beyond which the head is out of range, degrees.")
-    turned_deg: float = Field(default=45.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
+    range_deg: float = Field(
+        default=130.0,
+        gt=30,
+        le=180,
+        description="Yaw beyond which the head is out of range, degrees; 100 at most but for `regression`.",
+    )
+    turned_deg: float = Field(default=85.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
     doubt_deg: float = Field(
         default=80.0, gt=20, le=120, description="Beyond this yaw, and where lost, a frontal face that is seen starts it anew."
     )
     hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
+    widest_sigma_deg: float = Field(
+        default=35.0, gt=0, le=180, description="Of `regression`: a head whose yaw is less sure than this is lost, degrees."
+    )
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 
     initial_views: int = Field(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from deixis_runtime.lens import Lens
@@ -12,11 +13,28 @@ from numpy.typing import NDArray
 
 from .affine_head import AffineHead
 from .config import HeadposeConfig
+from .ellipsoid_head import EllipsoidHead
 from .head import ellipsoid
-from .tracked_head import Sight, TrackedHead, centre_of
+from .regressed_head import RegressedHead
+from .regression import Regression
+from .sight import HeadState, Sight, centre_of
 
-METHODS: dict[str, type[TrackedHead] | type[AffineHead]] = {"ellipsoid": TrackedHead, "affine": AffineHead}
-"""What follows one head, by the setting `method`."""
+
+class Head(Protocol):
+    """One head through time, by one of the methods."""
+
+    def update(self, sight: Sight) -> HeadState:
+        """The head in the next frame."""
+
+
+def heads_of(config: HeadposeConfig) -> Callable[[], Head]:
+    """What makes the head of a new person, by the setting `method`."""
+    if config.method == "regression":
+        regression = Regression()
+        return lambda: RegressedHead(config, regression)
+    surface = ellipsoid(config.head_semi_axes_m, config.surface_points, highest=-0.92, lowest=0.85)
+    follower = EllipsoidHead if config.method == "ellipsoid" else AffineHead
+    return lambda: follower(config, surface)
 
 
 class HeadPoseEstimator:
@@ -25,9 +43,8 @@ class HeadPoseEstimator:
     def __init__(self, config: HeadposeConfig) -> None:
         self._config = config
         self._clock = RunClock()
-        self._surface = ellipsoid(config.head_semi_axes_m, config.surface_points, highest=-0.92, lowest=0.85)
-        self._head_of_method = METHODS[config.method]
-        self._heads: dict[int, TrackedHead | AffineHead] = {}
+        self._new_head = heads_of(config)
+        self._heads: dict[int, Head] = {}
         self._seen_ns: dict[int, int] = {}
 
     def update(self, image: NDArray[np.uint8], tracks: Sequence[Track], lens: Lens, run: int, stamp_ns: int) -> list[HeadPose]:
@@ -51,10 +68,11 @@ class HeadPoseEstimator:
     def _estimate(self, face: Track, hands: Sequence[Track], image: NDArray[np.uint8], lens: Lens, now_ns: int) -> HeadPose:
         person = face.person_id
         assert person is not None
-        head = self._heads.setdefault(person, self._head_of_method(self._config, self._surface))
+        if person not in self._heads:
+            self._heads[person] = self._new_head()
         self._seen_ns[person] = now_ns
         camera = lens.pinhole_at(centre_of(face), (image.shape[1], image.shape[0]))
-        return head.update(Sight(image, camera, face, hands, now_ns)).of_person(person)
+        return self._heads[person].update(Sight(image, camera, face, hands, now_ns)).of_person(person)
 
     def _forget(self, now_ns: int, present: set[int | None]) -> None:
         for person in [p for p, seen in self._seen_ns.items() if p not in present]:

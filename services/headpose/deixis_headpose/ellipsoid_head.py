@@ -1,15 +1,13 @@
-"""One head through time: start, prediction, matching against keyframes, the gate, holding and finding it again."""
+"""One head through time by keyframes: start, prediction, matching, the gate, holding and finding it again."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from deixis_runtime.lens import Pinhole
-from deixis_schemas.messages import HeadPose, Point, PoseStatus, Side, Track
-from numpy.typing import NDArray
+from deixis_schemas.messages import Side
 
 from .config import HeadposeConfig
 from .head import Array, Pose, Surface, facing_camera, rotation_of
@@ -18,6 +16,7 @@ from .keyframes import Keyframes, take_keyframe
 from .lsm import Match, correlation, match, observe
 from .neck import Neck
 from .patch import Level, pyramid
+from .sight import HeadState, Sight, centre_of
 
 SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
@@ -27,42 +26,15 @@ WALKING_M_S = 0.4
 """Slower heads stand."""
 STILL_TURN, STILL_SHIFT_M = np.radians(1.0), 0.002
 """A head expected this near to where it was last is within the reach of the finest level, and matched on it alone."""
+FARTHEST_DEG = 100.0
+"""Beyond this yaw too little of the texture is seen to say where the head looks."""
 HAND_NEAR = (0.39, 0.33)
 """Keyframes are taken while hands are farther than this from the face's box, across and down, face widths."""
 SEARCH_TURNS_DEG = (-36.0, -24.0, -12.0, 12.0, 24.0, 36.0)
 """Turns tried about the vertical where the predicted pose does not match."""
 
 
-class Sight(NamedTuple):
-    """What one frame shows of one person."""
-
-    picture: NDArray[np.uint8]
-    camera: Pinhole
-    face: Track
-    hands: Sequence[Track]
-    now_ns: int
-
-
-@dataclass(frozen=True)
-class HeadState:
-    """The answer for one head in one frame."""
-
-    status: PoseStatus
-    angles_deg: tuple[float, float, float] | None = None
-    sigma_deg: float | None = None
-    side: Side | None = None
-
-    def of_person(self, person_id: int) -> HeadPose:
-        """As a message."""
-        if self.status != "tracking" or self.angles_deg is None:
-            return HeadPose(person_id=person_id, status=self.status, side=self.side)
-        yaw, pitch, roll = self.angles_deg
-        return HeadPose(
-            person_id=person_id, status=self.status, yaw_deg=yaw, yaw_sigma_deg=self.sigma_deg, pitch_deg=pitch, roll_deg=roll
-        )
-
-
-class TrackedHead:
+class EllipsoidHead:
     """Tracks one head."""
 
     def __init__(self, config: HeadposeConfig, surface: Surface) -> None:
@@ -139,7 +111,7 @@ class TrackedHead:
         starts = [last, last.moved(step), last.moved(1.6 * step)]
         found = self._refine(levels, self._best_start(levels, starts, sight.camera), sight.camera, neck, dt)
         # Out there the answer is the same for any yaw, so a believed match is enough.
-        far = abs(found.pose.angles_deg()[0]) > self._config.range_deg
+        far = abs(found.pose.angles_deg()[0]) > min(self._config.range_deg, FARTHEST_DEG)
         if found.correlation >= (self._config.gate if far else self._config.search_gate):
             return found
         starts = [turned(pose, turn) for pose in (last, last.moved(step)) for turn in SEARCH_TURNS_DEG]
@@ -200,18 +172,12 @@ class TrackedHead:
     def _state(self, held_s: float) -> HeadState:
         assert self._pose is not None
         angles = self._pose.angles_deg()
-        if abs(angles[0]) > self._config.range_deg:
+        if abs(angles[0]) > min(self._config.range_deg, FARTHEST_DEG):
             # The back of a head carries little texture, and its yaw may pass 180: the side is the one it left to.
             self._gone = self._gone or _side(angles[0])
             return HeadState("out_of_range", side=self._gone)
         self._gone = None
         return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
-
-
-def centre_of(face: Track) -> Point:
-    """Centre of a face's box, which is the head's (pixel coordinates)."""
-    x, y, width, height = face.bbox_px
-    return x + (width - 1) / 2, y + (height - 1) / 2
 
 
 def yaw_sigma_deg(yaw_deg: float, correlation: float, held_s: float) -> float:

@@ -1,0 +1,103 @@
+"""One head through time by single looks at it: what the looks say together, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from deixis_schemas.messages import Side
+
+from .config import HeadposeConfig
+from .head import Array, Pose
+from .head_reader import HeadReader
+from .regression import Look, Regression
+from .sight import HeadState, Sight
+from .turn_filter import Motion, TurnFilter
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """From what the network says of its errors to how large they are, each for yaw, pitch and roll.
+
+    gain: times the network's sigma. apart: times the angle between what a crop and its mirror image say. floor_deg: at least.
+    """
+
+    gain: tuple[float, float, float] = (0.96, 1.08, 0.75)
+    apart: tuple[float, float, float] = (0.37, 0.24, 0.0)
+    floor_deg: tuple[float, float, float] = (1.28, 0.55, 0.55)
+    lasting: float = 0.85
+    """Share of the variance that stays from look to look: it is the face's, not the picture's, and no filter takes it away."""
+
+    def variances(self, look: Look) -> tuple[Array, Array]:
+        """(3,) degrees squared of yaw, pitch, roll: what differs from look to look, and what stays."""
+        told = np.degrees(np.array(self.gain) * look.sigma)
+        between = np.degrees(np.array(self.apart) * look.apart)
+        whole = told**2 + between**2 + np.array(self.floor_deg) ** 2
+        return (1 - self.lasting) * whole, self.lasting * whole
+
+
+CALIBRATION = Calibration()
+"""Chosen by `python fitting/choose_headpose.py --seeds 1000:1016`."""
+
+
+class RegressedHead:
+    """Follows one head. `calibration` and `motion` are given where they are chosen, see fitting/choose_headpose.py."""
+
+    def __init__(
+        self,
+        config: HeadposeConfig,
+        regression: Regression,
+        calibration: Calibration = CALIBRATION,
+        motion: Motion = Motion(),  # noqa: B008 - it cannot be changed
+    ) -> None:
+        self._config = config
+        self._reader = HeadReader(regression)
+        self._calibration, self._motion = calibration, motion
+        self._turn: TurnFilter | None = None
+        self._lasting: Array = np.zeros(3)
+        self._seen_ns = 0
+        self._told_ns = 0
+
+    def update(self, sight: Sight) -> HeadState:
+        """The head in the next frame."""
+        return self.take(self._reader.read(sight), sight.now_ns)
+
+    def take(self, look: Look | None, now_ns: int) -> HeadState:
+        """Go on to `now_ns` with what was read there; none where no head was seen."""
+        if look is None:
+            return self._unseen(now_ns)
+        passing, self._lasting = self._calibration.variances(look)
+        angles = np.array(angles_of(look))
+        if self._turn is None or now_ns - self._seen_ns > self._config.hold_s * 1e9:
+            self._turn = TurnFilter(angles, passing, self._motion)
+        else:
+            self._turn.predict((now_ns - self._told_ns) * 1e-9)
+            self._turn.update(angles, passing)
+        self._seen_ns = self._told_ns = now_ns
+        return self._state(self._turn)
+
+    def _unseen(self, now_ns: int) -> HeadState:
+        """No head was seen: the last angles for a while, their sigma growing."""
+        if self._turn is None:
+            return HeadState("initialising")
+        if now_ns - self._seen_ns > self._config.hold_s * 1e9:
+            return HeadState("lost")
+        self._turn.predict((now_ns - self._told_ns) * 1e-9)
+        self._told_ns = now_ns
+        return self._state(self._turn)
+
+    def _state(self, turn: TurnFilter) -> HeadState:
+        yaw, pitch, roll = (float(angle) for angle in turn.angles_deg)
+        variances = turn.variances_deg2 + self._lasting
+        if variances[0] > self._config.widest_sigma_deg**2:
+            return HeadState("lost")
+        if abs(yaw) > self._config.range_deg:
+            side: Side = "left" if yaw > 0 else "right"
+            return HeadState("out_of_range", side=side)
+        of_yaw, of_pitch, of_roll = (float(value) for value in variances)
+        return HeadState("tracking", (yaw, pitch, roll), of_yaw**0.5, None, (of_yaw, of_pitch, of_roll))
+
+
+def angles_of(look: Look) -> tuple[float, float, float]:
+    """Yaw, pitch, roll of a look, degrees: relative to the line head -> camera, as Pose.angles_deg()."""
+    return Pose(look.rotation, np.array([0.0, 0.0, 1.0])).angles_deg()

@@ -1,0 +1,157 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from deixis_headpose.config import HeadposeConfig
+from deixis_headpose.head import rotation_of
+from deixis_headpose.head_crop import HeadPlace, crop_to_picture
+from deixis_headpose.head_reader import HeadReader, found_by
+from deixis_headpose.regressed_head import CALIBRATION, RegressedHead
+from deixis_headpose.regression import Look, Regression
+from deixis_headpose.sight import HeadState, Sight, centre_of
+from deixis_runtime.lens import Pinhole
+from deixis_schemas.messages import KindProbabilities, Track
+
+CAMERA = Pinhole(500.0, 319.5, 239.5)
+PICTURE = np.full((480, 640, 3), 90, np.uint8)
+FRAME_NS = 33_333_333
+CONFIG = HeadposeConfig()
+
+
+def a_look(yaw_deg: float, sigma_deg: float = 3.0, offset: tuple[float, float] = (0.0, 0.0), head: float = 0.99) -> Look:
+    sigma = np.full(3, np.radians(sigma_deg))
+    return Look(rotation_of(np.radians(yaw_deg), 0.0), sigma, 0.01, np.array(offset), 0.5125, head)
+
+
+def followed(looks: list[Look | None], first: int = 0) -> list[HeadState]:
+    head = RegressedHead(CONFIG, Regression())
+    return [head.take(look, (first + number) * FRAME_NS) for number, look in enumerate(looks)]
+
+
+def a_face(x: float = 300, y: float = 200, width: float = 60) -> Track:
+    return Track(
+        track_id=1,
+        person_id=1,
+        kind="face",
+        kind_probabilities=KindProbabilities(face=1.0),
+        centroid_px=(x, y),
+        bbox_px=(x - (width - 1) / 2, y - (width - 1) / 2, width, width),
+        velocity_px_s=(0, 0),
+    )
+
+
+class Shown(Regression):
+    """Sees heads at given places of the picture, whatever is in it; keeps where it was asked to look."""
+
+    def __init__(self, head_px: tuple[float, float]) -> None:
+        self.head_px, self.asked, self.head = head_px, 0, 0.99
+
+    def look(self, crop: np.ndarray) -> Look:
+        assert crop.shape == (64, 64, 3)
+        self.asked += 1
+        return replace(a_look(0.0, offset=self.offset), head=self.head)
+
+    offset = (0.0, 0.0)
+
+
+# --- through time ---------------------------------------------------------------------------------------------------------
+
+
+def test_one_look_is_enough_also_in_profile() -> None:
+    state = followed([a_look(-85)])[0]
+    assert state.status == "tracking"
+    assert state.angles_deg is not None
+    assert state.angles_deg[0] == pytest.approx(-85)
+
+
+def test_beyond_its_range_the_side_is_said() -> None:
+    states = followed([a_look(150)] * 5 + [a_look(-150)] * 40)
+    assert (states[4].status, states[4].side) == ("out_of_range", "left")
+    assert (states[-1].status, states[-1].side) == ("out_of_range", "right")
+
+
+def test_a_head_that_is_not_seen_is_held_and_then_lost_and_never_called_far() -> None:
+    states = followed([a_look(60)] * 5 + [None] * 15)
+    held = [state for state in states[5:] if state.status == "tracking"]
+    assert [state.status for state in states[5:]] == ["tracking"] * len(held) + ["lost"] * (15 - len(held))
+    assert 0.2 < len(held) * FRAME_NS * 1e-9 < 0.3
+    sigmas = [state.sigma_deg for state in held]
+    assert sigmas == sorted(sigmas)
+
+
+def test_a_head_never_seen_is_initialising() -> None:
+    assert {state.status for state in followed([None] * 20)} == {"initialising"}
+
+
+def test_a_head_found_again_is_read_anew_and_not_drawn_from_where_it_was() -> None:
+    state = followed([a_look(-70)] * 5 + [None] * 15 + [a_look(50)])[-1]
+    assert state.angles_deg is not None
+    assert state.angles_deg[0] == pytest.approx(50)
+
+
+def test_a_look_that_is_hardly_sure_is_no_answer() -> None:
+    assert followed([a_look(10, sigma_deg=57)])[0].status == "lost"
+
+
+def test_a_head_resting_for_an_hour_returns_within_two_degrees() -> None:
+    """Looks are absolute, so nothing can drift; held to it at one look each half minute, as a starved stage takes them."""
+    rng = np.random.default_rng(5)
+    head = RegressedHead(CONFIG, Regression())
+    for number in range(120):
+        head.take(a_look(30 + rng.normal(0, 1)), number * 30_000_000_000)
+    for number in range(30):
+        state = head.take(a_look(0.0), 3_600_000_000_000 + number * FRAME_NS)
+    assert state.angles_deg is not None
+    assert abs(state.angles_deg[0]) < 2
+
+
+def test_the_variances_are_those_of_the_message() -> None:
+    message = followed([a_look(20)] * 3)[-1].of_person(4)
+    assert message.covariance_deg2 is not None
+    assert message.yaw_sigma_deg == pytest.approx(message.covariance_deg2[0] ** 0.5)
+
+
+def test_many_looks_at_a_resting_head_do_not_make_it_surer_than_its_face_allows() -> None:
+    _, lasting = CALIBRATION.variances(a_look(20))
+    state = followed([a_look(20)] * 200)[-1]
+    assert state.sigma_deg is not None
+    assert state.sigma_deg**2 >= lasting[0]
+
+
+# --- where to look --------------------------------------------------------------------------------------------------------
+
+
+def test_a_new_head_is_looked_for_first_and_then_read() -> None:
+    shown = Shown((300, 200))
+    reader = HeadReader(shown)
+    assert reader.read(Sight(PICTURE, CAMERA, a_face(), [], 0)) is not None
+    assert shown.asked == 2
+    reader.read(Sight(PICTURE, CAMERA, a_face(), [], FRAME_NS))
+    assert shown.asked == 3
+
+
+def test_a_track_that_jumps_to_another_head_is_looked_at_anew() -> None:
+    shown = Shown((300, 200))
+    shown.offset = (0.2, 0.0)  # the head lies well beside the middle of the track's box
+    reader = HeadReader(shown)
+    for number in range(6):
+        reader.read(Sight(PICTURE, CAMERA, a_face(), [], number * FRAME_NS))
+    assert shown.asked > 7
+
+
+def test_what_is_no_head_is_not_read() -> None:
+    shown = Shown((300, 200))
+    shown.head = 0.1
+    assert HeadReader(shown).read(Sight(PICTURE, CAMERA, a_face(), [], 0)) is None
+
+
+def test_the_place_found_is_where_the_look_says() -> None:
+    place = HeadPlace((400.0, 180.0), 50.0)
+    found = found_by(a_look(0, offset=(0.25, -0.125)), place, CAMERA)
+    x, y, w = crop_to_picture(place, CAMERA) @ np.array([31.5 + 16, 31.5 - 8, 1.0])
+    assert found.centre_px == pytest.approx((x / w, y / w))
+    assert found.breadth_px == pytest.approx(place.breadth_px, rel=0.01)
+
+
+def test_the_centre_of_a_face_is_that_of_its_pixels() -> None:
+    assert centre_of(a_face(300, 200, 61)) == pytest.approx((300, 200))
