@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from deixis_headpose.regression import BREADTH_GAIN, BREADTH_MIDDLE, LEAK, standardised
+from deixis_headpose.regression import BREADTH_GAIN, BREADTH_MIDDLE, LEAK, standardised, weights_of
 from fit_crops import Crops
 from numpy.typing import NDArray
 from torch import nn
@@ -43,9 +43,14 @@ class Network(nn.Module):
 class Fit:
     """A network while it is fitted."""
 
-    def __init__(self, start: Path | None = None) -> None:
+    def __init__(self, start: Path | None = None, pixels: NDArray[np.uint8] | None = None) -> None:
+        """Begin anew; or go on from a checkpoint (.pt), or from weights of the stage (.npz) with some crops as they come."""
         self._network = Network().to(memory_format=torch.channels_last)
-        if start is not None:
+        if start is not None and start.suffix == ".npz":
+            if pixels is None:
+                raise ValueError("pixels: weights of the stage need crops to be normalised by")
+            _unfold(self._network, weights_of(start.read_bytes()), pixels)
+        elif start is not None:
             self._network.load_state_dict(torch.load(start))
         self._mean = {name: values.clone() for name, values in self._network.state_dict().items()}
         self._optimiser = torch.optim.AdamW(self._network.parameters(), lr=RATE, weight_decay=1e-3)
@@ -143,6 +148,34 @@ def _folded(weights: dict[str, torch.Tensor], name: str) -> tuple[torch.Tensor, 
     gain = weights[f"{name}.1.weight"] / torch.sqrt(weights[f"{name}.1.running_var"] + 1e-5)
     bias = weights[f"{name}.1.bias"] - weights[f"{name}.1.running_mean"] * gain
     return weights[f"{name}.0.weight"] * gain[:, None, None, None], bias
+
+
+def _unfold(network: Network, weights: dict[str, Any], pixels: NDArray[np.uint8]) -> None:
+    """Put the stage's weights into the network, which has to normalise in between: by what these crops give, so that it says
+    the same as before.
+    """
+    seen: dict[str, torch.Tensor] = {}
+    with torch.no_grad():
+        for name in LAYERS:
+            convolution, normalisation = getattr(network, name)
+            convolution.weight.copy_(torch.from_numpy(weights[name][0]).permute(3, 2, 0, 1))
+            normalisation.bias.copy_(torch.from_numpy(weights[name][1]))
+            convolution.register_forward_hook(lambda *given, name=name: seen.__setitem__(name, given[2]))
+        first = torch.from_numpy(weights["f1"][0]).reshape(4, 4, 128, 128).permute(3, 2, 0, 1)
+        network.f1.weight.copy_(first.reshape(128, 2048))
+        network.f1.bias.copy_(torch.from_numpy(weights["f1"][1]))
+        network.f2.weight.copy_(torch.from_numpy(weights["f2"][0]).T)
+        network.f2.bias.copy_(torch.from_numpy(weights["f2"][1]))
+        network.eval()
+        network(_tensor(pixels))
+        for name in LAYERS:
+            convolution, normalisation = getattr(network, name)
+            convolution._forward_hooks.clear()
+            mean, variance = seen[name].mean(dim=(0, 2, 3)), seen[name].var(dim=(0, 2, 3))
+            normalisation.running_mean.copy_(mean)
+            normalisation.running_var.copy_(variance)
+            normalisation.weight.copy_(torch.sqrt(variance + normalisation.eps))
+            normalisation.bias.add_(mean)
 
 
 def _leaky(values: torch.Tensor) -> torch.Tensor:

@@ -1,6 +1,6 @@
 """Fits the regression of head pose (`deixis_headpose/regression.npz`) on portraits that the simulator renders.
 
-usage: python fitting/fit_regression.py [--portraits N] [--minutes M] [--cache DIR] [--from CHECKPOINT] [--out FILE]
+usage: python fitting/fit_regression.py [--portraits N] [--minutes M] [--cache DIR] [--from FILE] [--out FILE]
 
 Portraits are of the simulator's fitting people alone (seeds below 1000); at the end the errors on the people who were held
 out are printed, which choose nothing here. Needs PyTorch, which Deixis itself does not: `pip install torch`. Two cores render
@@ -40,7 +40,7 @@ def main() -> int:
     parser.add_argument("--portraits", type=int, default=20000, help="of fitting people (default: 20000)")
     parser.add_argument("--minutes", type=float, default=60.0, help="of training (default: 60)")
     parser.add_argument("--cache", type=Path, default=CACHE, help="folder of rendered portraits and checkpoints")
-    parser.add_argument("--from", type=Path, dest="start", help="checkpoint to go on from")
+    parser.add_argument("--from", type=Path, dest="start", help="checkpoint (.pt) or weights (.npz) to go on from")
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="file of weights to write")
     given = parser.parse_args()
     try:
@@ -52,8 +52,8 @@ def main() -> int:
     count = -(-given.portraits // PART)
     fitting = render(given.cache, list(FITTING_SEEDS)[:count], PART)
     held_out = render(given.cache, [HELD_OUT_SEED], PART)
-    fit = Fit(given.start)
     with CropMaker(fitting) as maker:
+        fit = Fit(given.start, np.concatenate([maker.take().pixels for _ in range(8)]))
         train(fit, maker, given.minutes, given.cache / "checkpoint.pt")
     fit.export(given.out)
     print_errors(fit, Portraits.load(held_out))

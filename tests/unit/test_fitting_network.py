@@ -27,3 +27,5 @@ def test_the_stage_reads_what_the_fitted_network_says(tmp_path: Path) -> None:
     fit.export(tmp_path / "weights.npz")
     said = _forward(weights_of((tmp_path / "weights.npz").read_bytes()), standardised(pixels))[:, :3]
     assert said == pytest.approx(fit.noses(pixels), abs=0.02)
+    again = Fit(tmp_path / "weights.npz", pixels)
+    assert again.noses(pixels) == pytest.approx(fit.noses(pixels), abs=0.02)
