@@ -53,6 +53,7 @@ from headpose_inputs import (
 )
 from headpose_methods import ECC, MESH, MESH_PNP, Answers, Method, deixis_methods, maker_of, run
 from mediapipe_answers import RefereeError, answers_of, ask
+from real_people import is_there
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -223,11 +224,11 @@ def material_of(given: argparse.Namespace, console: Console) -> Material:
     clips: list[Clip] = []
     if given.clips or given.seeds:
         clips = list(choose(Choice(given.clips, given.seeds), console).clips)
-    elif _is_there("labelled clips", given.real / "rendered", console):
+    elif is_there("labelled clips", given.real / "rendered", console):
         clips = list(choose(Choice(given.real / "rendered", None), console).clips)
     signing, driving = given.real / "asl_clips", given.real / "drivface"
-    signers = signer_sources(signing) if _is_there("signers", signing, console) else []
-    drivers = labelled_drivers(driving) if _is_there("drivers", driving, console) else {}
+    signers = signer_sources(signing) if is_there("signers", signing, console) else []
+    drivers = labelled_drivers(driving) if is_there("drivers", driving, console) else {}
     return Material(clips, signers, drivers)
 
 
@@ -260,13 +261,6 @@ def measure(methods: Methods, material: Material, console: Console) -> dict[str,
     if material.drivers:
         made["drivers"] = measure_drivers(methods, material.drivers)
     return made
-
-
-def _is_there(name: str, folder: Path, console: Console) -> bool:
-    if folder.is_dir():
-        return True
-    console.print(f"{name}: left out, for '{folder}' is not there", style="yellow", markup=False, soft_wrap=True)
-    return False
 
 
 def _parser() -> argparse.ArgumentParser:

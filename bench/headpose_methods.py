@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Protocol, get_args
 
 from affine_alignment import FacePatch
@@ -19,8 +18,6 @@ from deixis_runtime.settings import CommonOptions, load_config
 from deixis_schemas.messages import Point, Track
 from headpose_inputs import Footage, Seen
 
-TODAYS = ("ellipsoid",)
-"""What Deixis does while its settings name no method."""
 ECC = "ecc"
 MESH, MESH_PNP = "facemesh", "facemesh_pnp"
 
@@ -104,20 +101,13 @@ class Ecc:
 
 def deixis_methods() -> tuple[str, ...]:
     """The head pose methods that Deixis' settings offer, its default first."""
-    known = HeadposeConfig.model_fields.get("method")
-    if known is None:
-        return TODAYS
-    kind = known.annotation
-    values = [item.value for item in kind] if isinstance(kind, type) and issubclass(kind, Enum) else list(get_args(kind))
-    names = [str(value) for value in values]
-    default = str(getattr(known.default, "value", known.default))
-    return tuple(sorted(names, key=lambda name: name != default))
+    method = HeadposeConfig.model_fields["method"]
+    return tuple(sorted(get_args(method.annotation), key=lambda name: name != method.default))
 
 
 def config_of(method: str, sets: list[str]) -> HeadposeConfig:
     """Deixis' settings for one of its methods, with `--set NAME=VALUE` on top. Raises ConfigError."""
-    own = [f"method={method}"] if "method" in HeadposeConfig.model_fields else []
-    options = CommonOptions("bench", "bench", "", True, False, 0, None, (*own, *sets))
+    options = CommonOptions("bench", "bench", "", True, False, 0, None, (f"method={method}", *sets))
     return load_config("headpose", HeadposeConfig, options)
 
 

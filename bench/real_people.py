@@ -43,7 +43,7 @@ def measure_heads(data: Path, clips: list[Clip], console: Console) -> Measured:
     """Figures of heads by source."""
     measured: Measured = {}
     for name, of, folder in (("signers", real_heads.signers, "asl_clips"), ("drivers", real_heads.drivers, "drivface")):
-        if _is_there(name, data / folder, console):
+        if is_there(name, data / folder, console):
             measured[name] = of(data / folder).figures()
     if clips:
         measured["rendered"] = real_heads.rendered(clips).figures()
@@ -55,7 +55,7 @@ def measure_hands(data: Path, clips: list[Clip], sample: int, console: Console) 
     measured: Measured = {}
     pictures = sample * PICTURES_A_CLIP
     for name, of in (("hgr1", real_hands.hgr1), ("hands", real_hands.boxed)):
-        if _is_there(name, data / name, console):
+        if is_there(name, data / name, console):
             measured[name] = of(data / name, pictures).figures()
     labelled = [clip for clip in clips if label_pictures_of(clip).exists()]
     if labelled:
@@ -87,7 +87,8 @@ def table_of(title: str, measured: Measured) -> Table:
     return table
 
 
-def _is_there(name: str, folder: Path, console: Console) -> bool:
+def is_there(name: str, folder: Path, console: Console) -> bool:
+    """Whether a set is there; where not, that is said."""
     if folder.is_dir():
         return True
     console.print(f"{name}: left out, for '{folder}' is not there", style="yellow", markup=False, soft_wrap=True)

@@ -17,6 +17,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from queue import Empty
 from typing import Any
 
 import cv2
@@ -110,7 +111,7 @@ class CropMaker:
         while True:
             try:
                 return self._queue.get(timeout=20)
-            except Exception:
+            except Empty:
                 if not self._process.is_alive():
                     raise RuntimeError("the process that makes crops has died") from None
 

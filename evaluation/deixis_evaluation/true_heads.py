@@ -42,6 +42,6 @@ class TrueHeads:
             return HeadPose(person_id=own, status="lost")
         if abs(yaw) > RANGE_DEG:
             return HeadPose(person_id=own, status="out_of_range", side="left" if yaw > 0 else "right")
-        # The sigma that the stage states for a perfect match: fusion weighs the truth as it weighs the stage.
+        # The sigma that the method `ellipsoid` states for a perfect match: fusion weighs the truth as it weighs a stage.
         sigma = yaw_sigma_deg(yaw, correlation=1.0, held_s=0.0)
         return HeadPose(person_id=own, status="tracking", yaw_deg=yaw, yaw_sigma_deg=sigma)

@@ -86,13 +86,19 @@ def fit_body(avatar: Avatar, height_m: float) -> Body:
     factor = head_factor(height_m)
     pivot = avatar.joint("Head")
     below = _head_bones(avatar)
-    share = np.asarray(avatar.weights[:, np.flatnonzero(below)].sum(axis=1)).ravel()[:, None]
+    share = head_share(avatar)[:, None]
     vertices = avatar.vertices + (factor - 1) * share * (avatar.vertices - pivot)
     joints = avatar.joints + (factor - 1) * below[:, None] * (avatar.joints - pivot)
     scale = height_m / float(vertices[:, 1].max())
     head_scale = scale * factor
     morphs = {name: (rows, offsets * np.float32(head_scale)) for name, (rows, offsets) in avatar.morphs.items()}
     return Body(avatar, scale, head_scale, (vertices * scale).astype(np.float32), joints * scale, morphs)
+
+
+def head_share(avatar: Avatar) -> Floats:
+    """How far each vertex goes with the head (n,), 0 to 1."""
+    share: Floats = np.asarray(avatar.weights[:, np.flatnonzero(_head_bones(avatar))].sum(axis=1)).ravel()
+    return share
 
 
 def _head_bones(avatar: Avatar) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 
 from .arms import hanging_arm
 from .avatars import Avatar, Picture, load_avatar
-from .body import Body, fit_body
+from .body import Body, fit_body, head_share
 from .dice import Dice
 from .draw import HELD_OUT_FROM_SEED, draw_scene
 from .draw_bodies import draw_bodies
@@ -84,7 +84,7 @@ def portraits(seed: int, avatars: Sequence[str], count: int, rooms: int = ROOMS)
 
 def warped_head(body: Body, rng: np.random.Generator) -> Body:
     """The body with another head: stretched along its axes and with smooth bumps, nearly the same on both sides."""
-    share = _head_share(body)[:, None]
+    share = head_share(body.avatar)[:, None]
     middle = body.head_centre
     stretch = 1 + rng.normal(0, [0.06, 0.06, 0.06])
     offset = (body.vertices - middle) * (stretch - 1)
@@ -255,12 +255,3 @@ def _empty_room(scene: Scene) -> FloatPicture:
         return stage.picture(view_at(scene.camera, robot_at(scene.robot_path, 0.0)), [])
     finally:
         stage.close()
-
-
-def _head_share(body: Body) -> Floats:
-    """How far each vertex goes with the head (n,), 0 to 1."""
-    avatar = body.avatar
-    below = [avatar.bone_index["Head"]]
-    for row in below:
-        below.extend(np.flatnonzero(avatar.parent == row).tolist())
-    return np.asarray(avatar.weights[:, below].sum(axis=1)).ravel().astype(float)

@@ -5,9 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deixis_headpose.head import rotation_of
-from simulation_ready import needs_renderer
-
-pytestmark = needs_renderer  # the portraits' module asks for the renderer's libraries
 
 
 @pytest.fixture(autouse=True)

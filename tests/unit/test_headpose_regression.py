@@ -50,10 +50,8 @@ def test_a_textured_head_rendered_at_a_known_pose_is_read() -> None:
 
 @needs_renderer
 def test_gain_and_offset_of_the_camera_do_not_matter() -> None:
-    for crop, _ in held_out_crops()[:6]:
-        if crop.min() < 20 or crop.max() > 235:
-            continue  # it would be clipped, and then it is another picture
-        dimmed = np.round(0.6 * crop.astype(float) + 40).astype(np.uint8)
+    for crop, _ in held_out_crops()[:12]:
+        dimmed = np.round(0.6 * crop.astype(float) + 40).astype(np.uint8)  # from 40 to 193: nothing is clipped
         apart = np.array(angles_of(REGRESSION.look(crop))) - angles_of(REGRESSION.look(dimmed))
         assert np.abs((apart + 180) % 360 - 180).max() < 3
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from deixis_runtime.lens import Pinhole
-from deixis_schemas.messages import FrontalFace, Point, Side
+from deixis_schemas.messages import FrontalFace, Point
 
 from .affine import match_patch, refusal, take_template, transform
 from .config import HeadposeConfig
@@ -28,7 +28,7 @@ from .head import Array, Surface
 from .initialise import Initialiser, frontal_pose
 from .neck import LEVER_M
 from .patch import Level, pyramid
-from .sight import HeadState, Sight, centre_of
+from .sight import HeadState, Sight, centre_of, side_of
 from .sphere import angle_of_edges
 
 HALF_WIDTH, HALF_HEIGHT = 0.7, 0.9
@@ -193,7 +193,7 @@ class AffineHead:
         if (now_ns - chain.matched_ns) * 1e-9 > self._config.hold_s:
             return HeadState("lost")
         if abs(longitude) > min(self._config.range_deg, FARTHEST_DEG):
-            return HeadState("out_of_range", side=_side(longitude))
+            return HeadState("out_of_range", side=side_of(longitude))
         return HeadState("tracking", (longitude, -latitude, roll), self._sigma_deg(chain, now_ns))
 
     def _sigma_deg(self, chain: Chain, now_ns: int) -> float:
@@ -202,7 +202,3 @@ class AffineHead:
         walk = SIGMA_PER_FRAME_DEG * math.sqrt(chain.frames)
         drift = math.hypot(START_SIGMA_DEG, SIGMA_PER_TURN * turn, SIGMA_PER_WAY * way, walk)
         return drift + SIGMA_PER_S_HELD * (now_ns - chain.matched_ns) * 1e-9
-
-
-def _side(yaw_deg: float) -> Side:
-    return "left" if yaw_deg > 0 else "right"

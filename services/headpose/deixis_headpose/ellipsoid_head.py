@@ -16,7 +16,7 @@ from .keyframes import Keyframes, take_keyframe
 from .lsm import Match, correlation, match, observe
 from .neck import Neck
 from .patch import Level, pyramid
-from .sight import HeadState, Sight, centre_of
+from .sight import HeadState, Sight, centre_of, side_of
 
 SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
@@ -166,7 +166,7 @@ class EllipsoidHead:
         if dt <= self._config.hold_s:
             return self._state(held_s=dt)
         if abs(yaw) >= self._config.turned_deg:
-            return HeadState("out_of_range", side=self._gone or _side(yaw))
+            return HeadState("out_of_range", side=self._gone or side_of(yaw))
         return HeadState("lost")
 
     def _state(self, held_s: float) -> HeadState:
@@ -174,7 +174,7 @@ class EllipsoidHead:
         angles = self._pose.angles_deg()
         if abs(angles[0]) > min(self._config.range_deg, FARTHEST_DEG):
             # The back of a head carries little texture, and its yaw may pass 180: the side is the one it left to.
-            self._gone = self._gone or _side(angles[0])
+            self._gone = self._gone or side_of(angles[0])
             return HeadState("out_of_range", side=self._gone)
         self._gone = None
         return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
@@ -201,10 +201,6 @@ def _same_place(one: Pose, other: Pose) -> bool:
     scale = other.position_m[2] / one.position_m[2]
     shift = np.linalg.norm(one.position_m[:2] * scale - other.position_m[:2])
     return bool(shift < SAME_PLACE_M and 0.75 < scale < 1.33)
-
-
-def _side(yaw_deg: float) -> Side:
-    return "left" if yaw_deg > 0 else "right"
 
 
 def _hand_near(sight: Sight) -> bool:

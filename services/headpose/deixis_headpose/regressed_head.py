@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from deixis_schemas.messages import Side
 
 from .config import HeadposeConfig
 from .head import Array, Pose
 from .head_reader import HeadReader
 from .regression import Look, Regression
-from .sight import HeadState, Sight
+from .sight import HeadState, Sight, side_of
 from .turn_filter import Motion, TurnFilter
 
 
@@ -91,10 +90,10 @@ class RegressedHead:
         variances = turn.variances_deg2 + self._lasting
         if variances[0] > self._config.widest_sigma_deg**2:
             return HeadState("lost")
-        if abs(yaw) > self._config.range_deg:
-            side: Side = "left" if yaw > 0 else "right"
-            return HeadState("out_of_range", side=side)
         of_yaw, of_pitch, of_roll = (float(value) for value in variances)
+        # Fusion takes it as certain that the head looks out there: it is only said where the sigma leaves no other choice.
+        if abs(yaw) - of_yaw**0.5 > self._config.range_deg:
+            return HeadState("out_of_range", side=side_of(yaw))
         return HeadState("tracking", (yaw, pitch, roll), of_yaw**0.5, None, (of_yaw, of_pitch, of_roll))
 
 

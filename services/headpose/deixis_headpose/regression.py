@@ -119,7 +119,7 @@ def _leaky(values: Floats) -> Floats:
 def _convolved(values: Floats, kernel: Floats, bias: Floats, stride: int) -> Floats:
     """Values (n, h, w, c) convolved with (k, k, c, d), padded by 1 before and k - 2 after: (n, h / stride, w / stride, d).
 
-    As one product of matrices; a crop of 64 pixels takes 1.2 ms in all, with cv2.dnn no less.
+    As one product of matrices, which numpy leaves to BLAS.
     """
     count, height, width, channels = values.shape
     size = kernel.shape[0]

@@ -56,6 +56,11 @@ class HeadState:
         )
 
 
+def side_of(yaw_deg: float) -> Side:
+    """The person's own side that a head is turned to."""
+    return "left" if yaw_deg > 0 else "right"
+
+
 def centre_of(face: Track) -> Point:
     """Centre of a face's box, which is the head's (pixel coordinates)."""
     x, y, width, height = face.bbox_px

@@ -46,10 +46,8 @@ class TurnFilter:
 
     @property
     def angles_deg(self) -> Array:
-        """Yaw, pitch, roll (3,); yaw in -180 to 180."""
-        angles: Array = np.einsum("m,mi->i", self._weights, self._states[:, :, 0])
-        angles[0] = (angles[0] + 180.0) % 360.0 - 180.0
-        return angles
+        """Yaw, pitch, roll (3,) in -180 to 180."""
+        return _wrapped(np.einsum("m,mi->i", self._weights, self._states[:, :, 0]))
 
     @property
     def variances_deg2(self) -> Array:
@@ -71,8 +69,7 @@ class TurnFilter:
 
     def update(self, angles_deg: Array, variances_deg2: Array) -> None:
         """Take a look (3,) with the variances of what differs from look to look."""
-        apart = angles_deg - self._states[:, :, 0]
-        apart[:, 0] = (apart[:, 0] + 180.0) % 360.0 - 180.0
+        apart = _wrapped(angles_deg - self._states[:, :, 0])
         expected = self._spreads[:, :, 0, 0] + variances_deg2
         gain = self._spreads[:, :, :, 0] / expected[:, :, None]
         self._states = self._states + gain * apart[:, :, None]
@@ -92,3 +89,8 @@ class TurnFilter:
         between = apart[..., :, None] * apart[..., None, :]
         self._spreads = np.einsum("ab,abijk->bijk", shares, self._spreads[:, None] + between)
         self._states, self._weights = states, weights
+
+
+def _wrapped(angles_deg: Array) -> Array:
+    """Into -180 (included) to 180."""
+    return np.asarray((angles_deg + 180.0) % 360.0 - 180.0)
