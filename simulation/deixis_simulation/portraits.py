@@ -22,6 +22,7 @@ from .draw_bodies import draw_bodies
 from .draw_lens import Overrides, draw_sensor
 from .geometry import Floats, View, robot_at, view_at
 from .lights import lighting
+from .mixed_heads import mixed_head, reduced
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
 from .rotations import about, turn, unit
@@ -41,8 +42,8 @@ BUST_M = 0.4
 """So far below the base of the head a person is drawn."""
 LANDMARKS = ("right_eye", "left_eye", "nose", "mouth", "chin", "right_ear", "left_ear", "crown")
 _BUMPS, _BUMP_M, _BUMP_RADIUS_M = 6, 0.004, (0.02, 0.06)
-_GLASSES, _HANDS = 0.2, 0.12
-"""Shares of portraits with glasses, and with something before the face."""
+_MIXED, _GLASSES, _HANDS = 0.9, 0.2, 0.12
+"""Shares of people whose heads are mixed; of portraits with glasses, and with something before the face."""
 
 
 @dataclass(frozen=True)
@@ -114,12 +115,13 @@ def _sitting(
 ) -> Iterator[Portrait]:
     dice = Dice(rng)
     drawn = draw_bodies(dice, avatars, 1)[0]
-    avatar = load_avatar(drawn.avatar)
+    avatar = mixed_head(drawn.avatar, avatars, rng) if rng.random() < _MIXED else reduced(load_avatar(drawn.avatar))
     body = warped_head(fit_body(avatar, drawn.height_m), rng)
     posture = _posture(rng, body)
     skeleton = solve(body, posture)
     mesh = skin(skeleton, posture.morphs)
     studio = _studio(avatar, studios)
+    studio.repaint(0, avatar)
     studio.tint(0, Tints(drawn.skin_tint, drawn.hair_tint, drawn.clothes_tint))
     _light(studio, scene.light, dice, skeleton, mesh)
     sensor = SensorModel(_of_portrait_size(scene, draw_sensor(dice)))
@@ -175,8 +177,8 @@ def _light(renderer: Renderer, light: Light, dice: Dice, skeleton: Skeleton, mes
 
 
 def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture) -> View:
-    """A camera that looks at the head from anywhere around it: three in four times not farther than 110 degrees aside."""
-    yaw = float(rng.uniform(-110, 110) if rng.random() < 0.75 else rng.uniform(-180, 180))
+    """A camera that looks at the head from anywhere around it: four in five times not farther than 135 degrees aside."""
+    yaw = float(rng.uniform(-135, 135) if rng.random() < 0.8 else rng.uniform(-180, 180))
     azimuth, elevation = posture.head[0] - yaw, float(np.clip(rng.normal(3, 11), -30, 40))
     roll = float(np.clip(rng.normal(0, 6), -20, 20))
     back = turn(azimuth, -elevation) @ np.array([0.0, 0.0, 1.0])

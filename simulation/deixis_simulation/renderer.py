@@ -186,6 +186,12 @@ class Renderer:
             "clothes_tint": tuple(tints.clothes),
         }
 
+    def repaint(self, number: int, look: Avatar) -> None:
+        """Give a person other pictures, of the same sizes as its own."""
+        for texture, picture in zip(self._people[number].maps[::2], (look.colours, look.skin_mask), strict=True):
+            texture.write(np.ascontiguousarray(picture).tobytes(), alignment=1)
+            texture.build_mipmaps()
+
     def pose(self, meshes: Sequence[Mesh]) -> None:
         """Put the people where they are now, in their order."""
         for drawn, mesh in zip(self._people, meshes, strict=True):
