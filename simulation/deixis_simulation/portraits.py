@@ -23,9 +23,10 @@ from .draw_lens import Overrides, draw_sensor
 from .geometry import Floats, View, robot_at, view_at
 from .lights import lighting
 from .mixed_heads import mixed_head, reduced
+from .portrait_arms import camera_bearing, direction_of, raised_arm
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
-from .rotations import about, turn, unit
+from .rotations import about, unit
 from .scene import Light, Scene, Sensor
 from .sensor import SensorModel
 from .skeleton import SIDES, Posture, Skeleton, solve
@@ -42,8 +43,12 @@ BUST_M = 0.4
 """So far below the base of the head a person is drawn."""
 LANDMARKS = ("right_eye", "left_eye", "nose", "mouth", "chin", "right_ear", "left_ear", "crown")
 _BUMPS, _BUMP_M, _BUMP_RADIUS_M = 6, 0.004, (0.02, 0.06)
-_MIXED, _GLASSES, _HANDS = 0.9, 0.2, 0.12
-"""Shares of people whose heads are mixed; of portraits with glasses, and with something before the face."""
+_MIXED, _RAISED, _BEFORE = 0.9, 0.35, 0.6
+"""Shares of people whose heads are mixed, and of those who raise an arm; of the portraits of these that show it at the face."""
+_GLASSES, _HANDS = 0.2, 0.12
+"""Shares of portraits with glasses, and with something before the face."""
+_NEAR_M, _FAR_M = 0.8, 5.0
+"""How far cameras are from heads; by as much as an arm reaches farther where it is raised."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,9 @@ def _sitting(
     drawn = draw_bodies(dice, avatars, 1)[0]
     avatar = mixed_head(drawn.avatar, avatars, rng) if rng.random() < _MIXED else reduced(load_avatar(drawn.avatar))
     body = warped_head(fit_body(avatar, drawn.height_m), rng)
-    posture = _posture(rng, body)
+    posture, hand = _posture(rng, body), None
+    if rng.random() < _RAISED:
+        side, posture.arms[side], hand = raised_arm(rng, body)
     skeleton = solve(body, posture)
     mesh = skin(skeleton, posture.morphs)
     studio = _studio(avatar, studios)
@@ -126,7 +133,7 @@ def _sitting(
     _light(studio, scene.light, dice, skeleton, mesh)
     sensor = SensorModel(_of_portrait_size(scene, draw_sensor(dice)))
     for number in range(count):
-        view = _view(rng, skeleton, posture)
+        view = _view(rng, skeleton, posture, hand)
         picture = over(studio.people(view, smooth=number % 4 == 0), _background(rng, rooms))
         if number == 0:
             sensor.meter(picture)
@@ -176,14 +183,19 @@ def _light(renderer: Renderer, light: Light, dice: Dice, skeleton: Skeleton, mes
     renderer.cast_people(skeleton.position("Head") - np.array([0.0, 0.3, 0.0]), 0.9)
 
 
-def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture) -> View:
-    """A camera that looks at the head from anywhere around it: four in five times not farther than 135 degrees aside."""
+def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture, hand: Floats | None) -> View:
+    """A camera that looks at the head from anywhere around it: four in five times not farther than 135 degrees aside.
+
+    `hand`: bearing of a raised one, which often comes between.
+    """
     yaw = float(rng.uniform(-135, 135) if rng.random() < 0.8 else rng.uniform(-180, 180))
-    azimuth, elevation = posture.head[0] - yaw, float(np.clip(rng.normal(3, 11), -30, 40))
+    bearing = np.array([posture.head[0] - yaw, float(np.clip(rng.normal(3, 11), -30, 40))])
+    if hand is not None and rng.random() < _BEFORE:
+        bearing = camera_bearing(rng, hand)
     roll = float(np.clip(rng.normal(0, 6), -20, 20))
-    back = turn(azimuth, -elevation) @ np.array([0.0, 0.0, 1.0])
+    back = direction_of(bearing)
     body = skeleton.body
-    distance = float(np.exp(rng.uniform(np.log(0.8), np.log(5.0))))
+    distance = float(np.exp(rng.uniform(np.log(_NEAR_M + (0.4 if hand is not None else 0)), np.log(_FAR_M))))
     centre = skeleton.carried("Head", body.head_centre)
     eye = centre + back * distance
     across = unit(np.cross([0.0, 1.0, 0.0], back))
