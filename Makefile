@@ -35,6 +35,7 @@ test: setup check
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
+	@for tools in bench fitting; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup
 	@$(BIN)/python bench/pipeline.py

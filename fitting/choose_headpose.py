@@ -184,7 +184,7 @@ def filtered(heads: list[list[Reading]], calibration: Calibration, motion: Motio
 
 def differences(angles_deg: NDArray[Any], true_deg: NDArray[Any]) -> NDArray[Any]:
     """Of angles (..., 3), each the short way round."""
-    return (angles_deg - true_deg + 180) % 360 - 180
+    return np.asarray((angles_deg - true_deg + 180) % 360 - 180)
 
 
 def coverage(errors: NDArray[Any], sigmas: NDArray[Any]) -> str:

@@ -127,20 +127,22 @@ def _cut(picture: NDArray[np.uint8], linear: Floats, shift: Floats, rng: np.rand
     share = low / INPUT_PX
     coarse = float(np.sqrt(np.linalg.det(linear))) * share
     if coarse < 0.7:
-        picture = cv2.GaussianBlur(picture, (0, 0), 0.45 / coarse)
+        picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.45 / coarse), np.uint8)
     warp = np.hstack([linear * share, ((shift + 0.5) * share - 0.5)[:, None]])
     crop = cv2.warpAffine(picture, warp, (low, low), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
-    crop = _taken(crop, rng)
-    return crop if low == INPUT_PX else cv2.resize(crop, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_LINEAR)
+    crop = _taken(np.asarray(crop, np.uint8), rng)
+    if low != INPUT_PX:
+        crop = cv2.resize(crop, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(crop, np.uint8)
 
 
 def _taken(crop: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
     """What a camera does to it: motion and lens blur, gamma, contrast, white balance, noise, compression."""
     if rng.random() < 0.25:
         crop = _moved(crop, rng)
-    image = crop.astype(np.float32)
+    image: Floats = crop.astype(np.float32)
     if rng.random() < 0.3:
-        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 1.3))
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 1.3)), np.float32)
     image = 255 * np.power(np.clip(image / 255, 0, 1), np.exp(rng.normal(0, 0.35)))
     image = (image - 128) * np.exp(rng.normal(0, 0.25)) + 128 + rng.normal(0, 18)
     image = _coloured(image, rng)
@@ -154,7 +156,7 @@ def _taken(crop: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     crop = np.clip(image, 0, 255).astype(np.uint8)
     if rng.random() < 0.4:
         packed = cv2.imencode(".jpg", crop, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 90))])[1]
-        crop = cv2.imdecode(packed, cv2.IMREAD_COLOR)
+        crop = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
     return crop
 
 
@@ -164,7 +166,7 @@ def _moved(crop: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     along, half = np.array([np.cos(angle), np.sin(angle)]), (size - 1) / 2
     start, end = (np.round(half + sign * half * along).astype(int).tolist() for sign in (-1, 1))
     kernel = cv2.line(np.zeros((size, size), np.float32), start, end, 1.0)
-    return cv2.filter2D(crop, -1, kernel / kernel.sum())
+    return np.asarray(cv2.filter2D(crop, -1, kernel / kernel.sum()), np.uint8)
 
 
 def _coloured(image: Floats, rng: np.random.Generator) -> Floats:
@@ -173,4 +175,4 @@ def _coloured(image: Floats, rng: np.random.Generator) -> Floats:
         return np.repeat((image @ GREY_OF_BGR)[..., None], 3, axis=2)
     image = image * np.exp(rng.normal(0, 0.12, 3)).astype(np.float32)
     grey = image.mean(axis=2, keepdims=True)
-    return grey + (image - grey) * rng.uniform(0.5, 1.4)
+    return np.asarray(grey + (image - grey) * rng.uniform(0.5, 1.4))

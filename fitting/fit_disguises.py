@@ -122,7 +122,7 @@ def _hair_colour(picture: NDArray[np.uint8], centre_px: Floats, crown_px: Floats
     """What the picture shows a little below the crown."""
     height, width = picture.shape[:2]
     x, y = np.round(crown_px + 0.18 * (centre_px - crown_px)).astype(int)
-    return picture[min(max(y, 0), height - 1), min(max(x, 0), width - 1)].astype(float)
+    return np.asarray(picture[min(max(y, 0), height - 1), min(max(x, 0), width - 1)], float)
 
 
 def _painted(
@@ -134,4 +134,4 @@ def _painted(
     soft = cv2.GaussianBlur(mask, (0, 0), rng.uniform(0.4, 1.2))[..., None] * (cover / 255)
     strands = cv2.resize(rng.normal(1, rough, (6, 24)), picture.shape[1::-1], interpolation=cv2.INTER_LINEAR)
     paint = (colour * rng.uniform(0.8, 1.2)) * strands[..., None]
-    return np.clip(picture * (1 - soft) + paint * soft, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(picture * (1 - soft) + paint * soft, 0, 255), np.uint8)

@@ -21,7 +21,7 @@ LEAK_SHARE = float(LEAK)
 LAYERS = ("c1", "c2", "r2", "c3", "r3", "c4", "r4")
 
 
-class Network(nn.Module):
+class Network(nn.Module):  # type: ignore[misc]  # where PyTorch is not installed its types are not known
     """Convolutions that halve the size (c) or add to it (r), each normalised over the batch; two full layers."""
 
     def __init__(self) -> None:

@@ -110,7 +110,8 @@ class CropMaker:
         """The next batch. Raises RuntimeError where the process has died: waiting for it would never end."""
         while True:
             try:
-                return self._queue.get(timeout=20)
+                made: Crops = self._queue.get(timeout=20)
+                return made
             except Empty:
                 if not self._process.is_alive():
                     raise RuntimeError("the process that makes crops has died") from None
@@ -137,7 +138,7 @@ def print_errors(fit: Any, portraits: Portraits) -> None:
 
 def yaws_of(noses: NDArray[Any]) -> NDArray[Any]:
     """Yaw, degrees, of directions (n, 3) of the nose."""
-    return np.degrees(np.arctan2(noses[:, 0], -noses[:, 2]))
+    return np.asarray(np.degrees(np.arctan2(noses[:, 0], -noses[:, 2])))
 
 
 if __name__ == "__main__":
