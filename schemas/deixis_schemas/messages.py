@@ -247,6 +247,11 @@ class HeadPose(Part):
         description="Covariance of yaw (y), pitch (p) and roll (r), degrees squared: yy, yp, yr, pp, pr, rr. Positive "
         "semidefinite; where `yaw_sigma_deg` is there too, it is the square root of yy.",
     )
+    face_width_px: Annotated[float, Field(gt=0, le=MAX_SIDE_PX)] | None = Field(
+        default=None,
+        description="How wide the face would be from the front, ear to ear (anatomy.FACE_WIDTH_M), as read from the head "
+        "however it is turned: how far away it is. None where the stage does not tell; then the track's box says it.",
+    )
     side: Side | None = Field(default=None, description="Side the head is turned to where out of range: the person's own.")
 
     @model_validator(mode="after")

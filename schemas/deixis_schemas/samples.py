@@ -118,6 +118,7 @@ SAMPLES: tuple[m.Message, ...] = (
                 pitch_deg=-6.0,
                 roll_deg=1.0,
                 covariance_deg2=(16.0, -1.5, 0.5, 9.0, 0.25, 4.0),
+                face_width_px=59.5,
             ),
             m.HeadPose(person_id=1, status="out_of_range", side="right"),
         ],

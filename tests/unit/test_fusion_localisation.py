@@ -29,7 +29,7 @@ from deixis_fusion.localisation import (
 from deixis_fusion.visibility import frame_of_discernment, sees
 from deixis_runtime.lens import LensError
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import CameraInfo, CameraMount, Poi, Track
+from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Poi, Track
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -133,6 +133,20 @@ def face(width: float) -> Track:
         {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
         | {"bbox_px": (320 - width / 2, 215, width, 60), "velocity_px_s": (0, 0)}
     )
+
+
+def test_a_person_is_as_far_away_as_its_head_says_where_it_was_read() -> None:
+    """A box around hair, half as wide again, puts a person a third nearer."""
+    read = HeadPose(person_id=1, status="tracking", yaw_deg=80, yaw_sigma_deg=3, face_width_px=46)
+    lost, blind = HeadPose(person_id=1, status="lost"), HeadPose(person_id=1, status="tracking", yaw_deg=80, yaw_sigma_deg=3)
+    far = {}
+    for name, pose in (("read", read), ("lost", lost), ("blind", blind)):
+        locator = PersonLocator(PlaceConfig())
+        locator.see(face(69), (640, 480), pose, (camera(), RobotPlace()), 0)
+        assert locator.place is not None
+        far[name] = locator.place.distance_m
+    assert far["read"] == pytest.approx(1.5 * far["lost"], rel=0.01)
+    assert far["blind"] == pytest.approx(far["lost"])
 
 
 def test_a_place_beyond_what_a_message_can_say_is_none() -> None:

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from deixis_headpose.config import HeadposeConfig
 from deixis_headpose.head import rotation_of
-from deixis_headpose.head_crop import HeadPlace, crop_to_picture
+from deixis_headpose.head_crop import CROP_M, HeadPlace, crop_to_picture
 from deixis_headpose.head_reader import HeadReader, found_by
 from deixis_headpose.regressed_head import CALIBRATION, RegressedHead
-from deixis_headpose.regression import Look, Regression
+from deixis_headpose.regression import EARS_APART_M, Look, Regression
 from deixis_headpose.sight import HeadState, Sight, centre_of
 from deixis_runtime.lens import Pinhole
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import KindProbabilities, Track
 
 CAMERA = Pinhole(500.0, 319.5, 239.5)
@@ -20,7 +21,7 @@ CONFIG = HeadposeConfig()
 
 def a_look(yaw_deg: float, sigma_deg: float = 3.0, offset: tuple[float, float] = (0.0, 0.0), head: float = 0.99) -> Look:
     sigma = np.full(3, np.radians(sigma_deg))
-    return Look(rotation_of(np.radians(yaw_deg), 0.0), sigma, 0.01, np.array(offset), 0.5125, head)
+    return Look(rotation_of(np.radians(yaw_deg), 0.0), sigma, 0.01, np.array(offset), EARS_APART_M / CROP_M, head)
 
 
 def followed(looks: list[Look | None]) -> list[HeadState]:
@@ -50,6 +51,17 @@ class Shown(Regression):
         assert crop.shape == (64, 64, 3)
         self.asked += 1
         return replace(a_look(0.0, offset=self.offset), head=self.head)
+
+
+class Bright(Regression):
+    """Sees a head as wide as what is bright in the crop."""
+
+    def __init__(self) -> None:
+        pass
+
+    def look(self, crop: np.ndarray) -> Look:
+        wide = float((crop[32, :, 0] > 172).mean())
+        return replace(a_look(0.0), breadth=wide * EARS_APART_M / FACE_WIDTH_M, head=0.99 if wide else 0.0)
 
 
 # --- through time ---------------------------------------------------------------------------------------------------------
@@ -152,7 +164,20 @@ def test_the_place_found_is_where_the_look_says() -> None:
     found = found_by(a_look(0, offset=(0.25, -0.125)), place, CAMERA)
     x, y, w = crop_to_picture(place, CAMERA) @ np.array([31.5 + 16, 31.5 - 8, 1.0])
     assert found.centre_px == pytest.approx((x / w, y / w))
-    assert found.breadth_px == pytest.approx(place.breadth_px, rel=0.01)
+    assert found.face_width_px == pytest.approx(place.face_width_px, rel=0.01)
+
+
+@pytest.mark.parametrize("box_px", [48, 60, 75])
+def test_the_width_told_is_that_of_the_face_where_the_tracks_box_is_not(box_px: int) -> None:
+    """By a fifth: hair, and a profile, change a box by as much."""
+    picture = PICTURE.copy()
+    picture[:, 270:330] = 255
+    head, width_px = RegressedHead(CONFIG, Bright()), None
+    for number in range(60):
+        width_px = head.update(Sight(picture, CAMERA, a_face(width=box_px), [], number * FRAME_NS)).face_width_px
+    assert width_px == pytest.approx(60, rel=0.04)
+    unseen = head.update(Sight(PICTURE, CAMERA, a_face(width=box_px), [], 60 * FRAME_NS))
+    assert unseen.face_width_px is None
 
 
 def test_the_centre_of_a_face_is_that_of_its_pixels() -> None:

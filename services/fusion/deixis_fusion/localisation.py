@@ -145,12 +145,14 @@ class PersonLocator:
     def _placed(
         self, face: Track, size: tuple[int, int], pose: HeadPose | None, camera: Camera, robot: RobotPlace, now_ns: int
     ) -> PersonPlace | None:
-        x, y, width, height = face.bbox_px
+        x, y, box_width, height = face.bbox_px
+        # A box is as wide as what it shows: hair, a profile, half a face. A head that was read says better how wide it is.
+        read = pose.face_width_px if pose is not None and pose.status == "tracking" else None
         elapsed_s = (now_ns - self._placed_ns) / 1e9 if self._placed_ns is not None else 0.0
-        measured = depth_of_face(camera.lens, width, size)
-        depth = self._distance.update(measured, elapsed_s, self._is_frontal(pose))
+        measured = depth_of_face(camera.lens, read or box_width, size)
+        depth = self._distance.update(measured, elapsed_s, read is not None or self._is_frontal(pose))
         # Pixel centres are integers: a box from x to x + width - 1 is centred half a pixel before x + width / 2.
-        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
+        centre = (x + (box_width - 1) / 2, y + (height - 1) / 2)
         place = locate(camera, robot, HeadSighting(centre, size, depth), self._config.distance_sigma)
         return place if all(abs(value) <= FARTHEST_M for value in place.position_m) else None
 
@@ -163,8 +165,8 @@ class PersonLocator:
 class DistanceFilter:
     """Smooths one person's depth over time.
 
-    A face that turns away shows another width (a profile is up to a fifth narrower or wider), so that depth follows slowly
-    while the head is turned.
+    A face that turns away has a box of another width (a profile is up to a fifth narrower or wider), so that depth follows
+    slowly while the head is turned, unless its width was read from the head itself.
     """
 
     TURNED_SLOWDOWN = 8.0

@@ -22,15 +22,15 @@ COARSE = 1.6
 
 @dataclass(frozen=True)
 class HeadPlace:
-    """Where a head is in the picture: its middle, pixels, and its breadth ear to ear as from the front, pixels."""
+    """Where a head is in the picture: its middle, and the width of its face as from the front (FACE_WIDTH_M), pixels."""
 
     centre_px: Point
-    breadth_px: float
+    face_width_px: float
 
     @property
     def side_px(self) -> float:
         """Side of the crop about it, pixels."""
-        return self.breadth_px * CROP_M / FACE_WIDTH_M
+        return self.face_width_px * CROP_M / FACE_WIDTH_M
 
 
 def ray_to(centre_px: Point, camera: Pinhole) -> Array:

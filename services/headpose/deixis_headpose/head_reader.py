@@ -6,20 +6,21 @@ import math
 
 import numpy as np
 from deixis_runtime.lens import Pinhole
+from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import Point
 
 from .head_crop import INPUT_PX, HeadPlace, crop_to_picture, cut_head
-from .regression import Look, Regression
+from .regression import EARS_APART_M, Look, Regression
 from .sight import Sight, centre_of
 
 LEAST_HEAD = 0.5
 """Below this share the network sees no head."""
-FOLLOW, FOLLOW_BREADTH = 0.5, 0.12
-"""Shares of what a look says of the head's place and breadth that are believed at once."""
+FOLLOW, FOLLOW_WIDTH = 0.5, 0.12
+"""Shares of what a look says of the head's place and width that are believed at once."""
 STRAYED = 0.3
 """The place is taken from the track anew where it is farther from it than this, in sides of the crop."""
-BREADTH_LIMITS = 0.75, 1.33
-"""The head's breadth is held within these times the track's."""
+WIDTH_LIMITS = 0.75, 1.33
+"""The face's width is held within these times the track's."""
 
 
 class HeadReader:
@@ -45,6 +46,11 @@ class HeadReader:
         self._track_px = centre_of(sight.face)
         return look
 
+    @property
+    def face_width_px(self) -> float | None:
+        """How wide the face would be from the front, by the looks so far; none where no head is seen."""
+        return self._place.face_width_px if self._place is not None else None
+
     def _look(self, sight: Sight, place: HeadPlace) -> Look:
         return self._regression.look(cut_head(sight.picture, place, sight.camera))
 
@@ -56,18 +62,18 @@ class HeadReader:
         at = self._place.centre_px[0] + x - self._track_px[0], self._place.centre_px[1] + y - self._track_px[1]
         if math.dist(at, (x, y)) > STRAYED * HeadPlace((x, y), width).side_px:
             return None
-        low, high = (limit * width for limit in BREADTH_LIMITS)
-        return HeadPlace(at, min(max(self._place.breadth_px, low), high))
+        low, high = (limit * width for limit in WIDTH_LIMITS)
+        return HeadPlace(at, min(max(self._place.face_width_px, low), high))
 
 
 def found_by(look: Look, place: HeadPlace, camera: Pinhole) -> HeadPlace:
     """Where a look at `place` found the head."""
     middle = (INPUT_PX - 1) / 2
     x, y, w = crop_to_picture(place, camera) @ np.array([*(middle + look.offset * INPUT_PX), 1.0])
-    return HeadPlace((x / w, y / w), look.breadth * place.side_px)
+    return HeadPlace((x / w, y / w), look.breadth * place.side_px * FACE_WIDTH_M / EARS_APART_M)
 
 
 def _mixed(place: HeadPlace, found: HeadPlace) -> HeadPlace:
     """Between where the head was expected and where it was found."""
     x, y = (a + FOLLOW * (b - a) for a, b in zip(place.centre_px, found.centre_px, strict=True))
-    return HeadPlace((x, y), place.breadth_px * (found.breadth_px / place.breadth_px) ** FOLLOW_BREADTH)
+    return HeadPlace((x, y), place.face_width_px * (found.face_width_px / place.face_width_px) ** FOLLOW_WIDTH)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,7 +59,8 @@ class RegressedHead:
 
     def update(self, sight: Sight) -> HeadState:
         """The head in the next frame."""
-        return self.take(self._reader.read(sight), sight.now_ns)
+        state = self.take(self._reader.read(sight), sight.now_ns)
+        return replace(state, face_width_px=self._reader.face_width_px)
 
     def take(self, look: Look | None, now_ns: int) -> HeadState:
         """Go on to `now_ns` with what was read there; none where no head was seen."""

@@ -26,7 +26,7 @@ class Sight(NamedTuple):
 class HeadState:
     """The answer for one head in one frame. angles_deg: yaw, pitch, roll.
 
-    sigma_deg: of the yaw. variances_deg2: of all three, where the method tells them.
+    sigma_deg: of the yaw. variances_deg2: of all three, where the method tells them. face_width_px: from the front, likewise.
     """
 
     status: PoseStatus
@@ -34,6 +34,7 @@ class HeadState:
     sigma_deg: float | None = None
     side: Side | None = None
     variances_deg2: tuple[float, float, float] | None = None
+    face_width_px: float | None = None
 
     def of_person(self, person_id: int) -> HeadPose:
         """As a message."""
@@ -53,6 +54,7 @@ class HeadState:
             pitch_deg=pitch,
             roll_deg=roll,
             covariance_deg2=covariance,
+            face_width_px=self.face_width_px,
         )
 
 
