@@ -21,8 +21,8 @@ from .geometry import Floats
 
 ATLAS_PX = 768
 """Side of the picture of body and head, after reduction: portraits show no more."""
-BALD = "AIAN_F_1_Casual"
-"""The avatar whose scalp is skin: its hair is a wig."""
+WIGGED = "AIAN_F_1_Casual"
+"""The avatar whose hair is a wig, on a scalp of skin."""
 HEIGHTS_M = np.array([-0.14, -0.07, -0.035, 0.0, 0.05, 0.12])
 """Chin, mouth, nose, eyes, forehead, crown, from between the eyes: what is mixed of two is mixed differently at each."""
 SKULL_M = np.array([0.0, 0.01, -0.085])
@@ -33,10 +33,12 @@ HAIRLINE_DEG = np.array([42.0, 38.0, 18.0, -12.0, -38.0, -48.0])
 HAIRLINE_SPREAD_DEG = np.array([8.0, 8.0, 10.0, 14.0, 10.0, 8.0])
 LONG_DEG = np.array([-2.0, -4.0, -30.0, -48.0, -55.0, -55.0])
 """How hair that hangs down changes it at most."""
-PAINTED, BALD_SHARE, ONE_SIDED, BEARD, WIG = 0.55, 0.2, 0.45, 0.2, 0.65
+PAINTED, BALD_SHARE, ONE_SIDED, BEARD, WIG = 0.55, 0.2, 0.45, 0.2, 0.8
 """Shares of heads with painted hair and with none (others have an avatar's); of painted ones that differ by side; of beards;
 of wigs kept where an avatar has one."""
 THICKEST_M = 0.035
+TUCKED, SWEPT = 0.4, 0.3
+"""Shares of sides on which long hair is put behind the ear, and on which it falls into the face."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,8 @@ def mixed_head(base: str, others: Sequence[str], rng: np.random.Generator) -> Av
         colours, skin = _with_hair(colours, skin, _beard(atlas, rng), rng)
     if rng.random() > WIG or PAINTED <= kind < PAINTED + BALD_SHARE:
         vertices = _without_wig(avatar, vertices)
+    else:
+        vertices = _combed(avatar, vertices, rng)
     return _painted(replace(avatar, vertices=vertices.astype(np.float32)), atlas, colours, skin)
 
 
@@ -126,6 +130,29 @@ def _thickened(avatar: Avatar, vertices: Floats, hair: Floats, rng: np.random.Ge
     return moved
 
 
+def _combed(avatar: Avatar, vertices: Floats, rng: np.random.Generator) -> Floats:
+    """With the wig cut to any length, and each side combed by itself: behind the ear, or into the face.
+
+    One ear free and one covered was read as a turn of 10 to 25 degrees, of drivers and of people who sign.
+    """
+    wig = np.flatnonzero(_is_wig(avatar))
+    own = vertices[wig] - avatar.eyes - SKULL_M
+    around = np.arctan2(own[:, 0], own[:, 2]) + np.radians(rng.normal(0, 8))
+    wide, y = np.hypot(own[:, 0], own[:, 2]) * rng.uniform(0.94, 1.15), own[:, 1]
+    hanging = np.clip((0.05 - y) / 0.06, 0, 1)
+    for side in (-1.0, 1.0):
+        here = hanging * (np.sign(around) == side)
+        kind = rng.random()
+        back_deg = rng.uniform(20, 65) if kind < TUCKED else -rng.uniform(0, 28) if kind < TUCKED + SWEPT else rng.normal(0, 6)
+        # What hangs at the back has no farther to go.
+        around = around + side * np.radians(back_deg) * here * (1 - np.abs(around) / np.pi)
+    longer = rng.uniform(0.2, 1.3)
+    low = np.where(y < -0.07, -0.07 + (y + 0.07) * longer, y)
+    moved = vertices.copy()
+    moved[wig] = avatar.eyes + SKULL_M + np.stack([wide * np.sin(around), low, wide * np.cos(around)], axis=1)
+    return moved
+
+
 def _without_wig(avatar: Avatar, vertices: Floats) -> Floats:
     """With the wig put away, into the skull."""
     moved = vertices.copy()
@@ -158,7 +185,7 @@ def _mixed_face(own: _Atlas, other: _Atlas, rng: np.random.Generator) -> tuple[F
 
 def _shaved(own: _Atlas, colours: Floats, skin: Floats) -> tuple[Floats, Floats]:
     """With skin instead of hair."""
-    bald = _atlas(BALD)
+    bald = _atlas(WIGGED)
     around, up = _bearing(own.places)
     face = own.head & (np.abs(around) < 50) & (up < 25) & (up > -40) & (skin > 0.5)
     ratio = colours[face].mean(axis=0) / np.maximum(bald.colours[face].mean(axis=0), 1)

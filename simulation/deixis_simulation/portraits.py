@@ -22,7 +22,7 @@ from .draw_bodies import draw_bodies
 from .draw_lens import Overrides, draw_sensor
 from .geometry import Floats, View, robot_at, view_at
 from .lights import lighting
-from .mixed_heads import mixed_head, reduced
+from .mixed_heads import WIGGED, mixed_head, reduced
 from .portrait_arms import camera_bearing, direction_of, raised_arm
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
@@ -43,8 +43,9 @@ BUST_M = 0.4
 """So far below the base of the head a person is drawn."""
 LANDMARKS = ("right_eye", "left_eye", "nose", "mouth", "chin", "right_ear", "left_ear", "crown")
 _BUMPS, _BUMP_M, _BUMP_RADIUS_M = 6, 0.004, (0.02, 0.06)
-_MIXED, _RAISED, _BEFORE = 0.9, 0.35, 0.6
-"""Shares of people whose heads are mixed, and of those who raise an arm; of the portraits of these that show it at the face."""
+_MIXED, _LONG_HAIR, _RAISED, _BEFORE = 0.9, 0.2, 0.3, 0.6
+"""Shares of people whose heads are mixed, of those with long hair beyond chance, and of those who raise an arm; of the
+portraits of these that show it at the face."""
 _GLASSES, _HANDS = 0.2, 0.12
 """Shares of portraits with glasses, and with something before the face."""
 _NEAR_M, _FAR_M = 0.8, 5.0
@@ -120,7 +121,8 @@ def _sitting(
 ) -> Iterator[Portrait]:
     dice = Dice(rng)
     drawn = draw_bodies(dice, avatars, 1)[0]
-    avatar = mixed_head(drawn.avatar, avatars, rng) if rng.random() < _MIXED else reduced(load_avatar(drawn.avatar))
+    base = WIGGED if WIGGED in avatars and rng.random() < _LONG_HAIR else drawn.avatar
+    avatar = mixed_head(base, avatars, rng) if rng.random() < _MIXED else reduced(load_avatar(base))
     body = warped_head(fit_body(avatar, drawn.height_m), rng)
     posture, hand = _posture(rng, body), None
     if rng.random() < _RAISED:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from deixis_simulation.avatars import FITTING_AVATARS, HEAD, Avatar, load_avatar
-from deixis_simulation.mixed_heads import ATLAS_PX, mixed_head, reduced
+from deixis_simulation.mixed_heads import ATLAS_PX, WIGGED, mixed_head, reduced
 
 BASE = FITTING_AVATARS[1]
 
@@ -76,3 +76,21 @@ def test_some_heads_are_bald_and_some_have_hair_that_hides_one_side() -> None:
 def skin_at(avatar: Avatar, mask: np.ndarray, rows: np.ndarray) -> float:
     x, y = np.clip(avatar.texture_coordinates[rows] * ATLAS_PX, 0, ATLAS_PX - 1).astype(int).T
     return float(mask[y, x].mean() / 255)
+
+
+def test_long_hair_is_combed_behind_one_ear_or_into_the_face_and_cut() -> None:
+    """How far ahead hair hangs below the eyes on either side, and how far down, over many heads."""
+    plain = load_avatar(WIGGED)
+    wig = (plain.part == HEAD) & ~plain.is_body & ~plain.is_eye
+    apart, lowest = [], []
+    for seed in range(60):
+        hair = mixed(seed, WIGGED).vertices[wig] - plain.eyes
+        hanging = hair[hair[:, 1] < -0.02]
+        if len(hanging) > 500:  # else it is bald, or wears its hair short
+            left, right = (np.quantile(hanging[side * hanging[:, 0] > 0.03, 2], 0.9) for side in (1, -1))
+            apart.append(abs(left - right))
+            lowest.append(hanging[:, 1].min())
+    assert len(apart) > 20
+    assert max(apart) > 0.05
+    assert min(lowest) < -0.25
+    assert max(lowest) > -0.2
