@@ -25,12 +25,12 @@ class Figures(NamedTuple):
 
 
 LEAST = {
-    "head_turn": Figures(0.98, None, 4.5, 4.0),
-    "pointing": Figures(0.97, 0.97, 4.0, 5.0),
+    "head_turn": Figures(0.98, None, 3.0, 4.0),
+    "pointing": Figures(0.97, 0.97, 3.5, 4.0),
     "small": Figures(0.95, 0.80, 2.0, 4.0),
-    # She stands 17 % farther off than the width of her face says, in the labelled set as well.
-    "two_persons": Figures(0.97, 0.97, 2.5, 14.0),
-    "wave": Figures(0.97, 0.97, 2.0, 4.0),
+    "two_persons": Figures(0.97, 0.97, 2.0, 4.0),
+    # Her head is read an eighth broader than it is; all other clips of the set lie within 10 %.
+    "wave": Figures(0.97, 0.97, 2.0, 13.0),
 }
 
 

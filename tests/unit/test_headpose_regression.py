@@ -36,14 +36,14 @@ def held_out_crops() -> list[tuple[np.ndarray, np.ndarray]]:
 
 @needs_renderer
 def test_a_textured_head_rendered_at_a_known_pose_is_read() -> None:
-    """Of people whom the network has never seen, in any turn and light; single looks, so some are off."""
+    """Of people whom the network has never seen, a third with an arm at the face, in any turn and light, by single looks."""
     errors = []
     for crop, true in held_out_crops():
         look = REGRESSION.look(crop)
         errors.append((np.array(angles_of(look)) - true + 180) % 360 - 180)
         assert look.head > 0.5
     yaw, pitch, roll = np.median(np.abs(errors), axis=0)
-    assert yaw < 6
+    assert yaw < 8
     assert pitch < 6
     assert roll < 6
 

@@ -57,7 +57,7 @@ class HeadposeConfig(StageConfig):
     )
     hold_s: float = Field(default=0.25, ge=0, le=5, description="A pose below the gate is held this long, its sigma growing.")
     widest_sigma_deg: float = Field(
-        default=35.0, gt=0, le=180, description="Of `regression`: a head whose yaw is less sure than this is lost, degrees."
+        default=25.0, gt=0, le=180, description="Of `regression`: a head whose yaw is less sure than this is lost, degrees."
     )
     forget_s: float = Field(default=2.0, gt=0, le=60, description="A person not in the tracks this long is forgotten.")
 

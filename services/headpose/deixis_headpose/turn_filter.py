@@ -27,7 +27,7 @@ class Motion:
     jerkiness: of the resting and the turning model, degrees / s^1.5. stays_s: how long either lasts.
     """
 
-    jerkiness: tuple[float, float] = (10.0, 400.0)
+    jerkiness: tuple[float, float] = (40.0, 400.0)
     stays_s: tuple[float, float] = (1.0, 0.35)
 
 
