@@ -9,7 +9,7 @@ pytestmark = needs_renderer
 
 @pytest.fixture(scope="module")
 def made() -> list[Portrait]:
-    return list(portraits(3, FITTING_AVATARS, 40, rooms=2))
+    return list(portraits(3, FITTING_AVATARS, 96, rooms=2))
 
 
 def yaw_of(portrait: Portrait) -> float:
