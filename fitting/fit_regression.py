@@ -4,8 +4,8 @@ usage: python fitting/fit_regression.py [--portraits N] [--minutes M] [--cache D
 
 Portraits are of the simulator's fitting people alone (seeds below 1000); at the end the errors on the people who were held
 out are printed, which choose nothing here. Needs PyTorch, which Deixis itself does not: `pip install torch`. Two cores render
-40 portraits a second and read 300 crops a second while training; what is committed came from the arguments in
-services/headpose/README.md. Another run gives other weights, as good.
+70 portraits a second and read 900 crops a second while training. What is committed came from several such runs, one after the
+other (services/headpose/README.md). Another run gives other weights, as good.
 """
 
 from __future__ import annotations

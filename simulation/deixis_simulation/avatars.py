@@ -29,6 +29,8 @@ FITTING_AVATARS: tuple[str, ...] = (
 HELD_OUT_AVATARS: tuple[str, ...] = (
     "Asian_F_1_Casual", "Black_M_2_Casual", "Hispanic_F_1_Casual", "MENA_M_2_Casual", "White_F_1_Casual", "White_M_3_Casual",
 )  # fmt: skip
+WIGGED = "AIAN_F_1_Casual"
+"""The fitting avatar whose hair is a wig, on a scalp of skin."""
 AVATARS: tuple[str, ...] = tuple(sorted(FITTING_AVATARS + HELD_OUT_AVATARS))
 
 HEAD, NECK, RIGHT_HAND, LEFT_HAND, RIGHT_ARM, LEFT_ARM, BODY = range(1, 8)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from .arms import hanging_arm
-from .avatars import Avatar, Picture, load_avatar
+from .avatars import WIGGED, Avatar, Picture, load_avatar
 from .body import Body, fit_body, head_share
 from .dice import Dice
 from .draw import HELD_OUT_FROM_SEED, draw_scene
@@ -22,7 +22,7 @@ from .draw_bodies import draw_bodies
 from .draw_lens import Overrides, draw_sensor
 from .geometry import Floats, View, robot_at, view_at
 from .lights import lighting
-from .mixed_heads import WIGGED, mixed_head, reduced
+from .mixed_heads import mixed_head, reduced
 from .portrait_arms import camera_bearing, direction_of, raised_arm
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
@@ -71,7 +71,7 @@ class Portrait:
 def portraits(seed: int, avatars: Sequence[str], count: int, rooms: int = ROOMS) -> Iterator[Portrait]:
     """So many portraits of people made from these avatars, in so many rooms; the same for the same arguments.
 
-    Raises RenderError.
+    Raises RenderError; AvatarError for fewer than two avatars.
     """
     rng = np.random.default_rng(seed)
     scenes = _scenes(rng, rooms)

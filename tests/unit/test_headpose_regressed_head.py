@@ -64,6 +64,17 @@ class Bright(Regression):
         return replace(a_look(0.0), breadth=wide * EARS_APART_M / FACE_WIDTH_M, head=0.99 if wide else 0.0)
 
 
+class Unreasonable(Regression):
+    """Sees a head of that breadth wherever it looks."""
+
+    def __init__(self, breadth: float) -> None:
+        self.breadth = breadth
+
+    def look(self, crop: np.ndarray) -> Look:
+        assert crop.shape == (64, 64, 3)
+        return replace(a_look(0.0), breadth=self.breadth)
+
+
 # --- through time ---------------------------------------------------------------------------------------------------------
 
 
@@ -178,6 +189,15 @@ def test_the_width_told_is_that_of_the_face_where_the_tracks_box_is_not(box_px: 
     assert width_px == pytest.approx(60, rel=0.04)
     unseen = head.update(Sight(PICTURE, CAMERA, a_face(width=box_px), [], 60 * FRAME_NS))
     assert unseen.face_width_px is None
+
+
+@pytest.mark.parametrize(("breadth", "times"), [(1e12, 1.33), (1e-12, 0.75)])
+def test_a_width_read_out_of_all_reason_is_held_to_that_of_the_track(breadth: float, times: float) -> None:
+    """From the first frame on: no message could say it, and the stage would end."""
+    head = RegressedHead(CONFIG, Unreasonable(breadth))
+    for number in range(3):
+        pose = head.update(Sight(PICTURE, CAMERA, a_face(width=60), [], number * FRAME_NS)).of_person(1)
+        assert pose.face_width_px == pytest.approx(times * 60)
 
 
 def test_the_centre_of_a_face_is_that_of_its_pixels() -> None:

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from deixis_simulation.avatars import FITTING_AVATARS, HEAD, Avatar, load_avatar
-from deixis_simulation.mixed_heads import ATLAS_PX, WIGGED, mixed_head, reduced
+from deixis_simulation.avatars import FITTING_AVATARS, HEAD, WIGGED, Avatar, AvatarError, load_avatar
+from deixis_simulation.head_atlas import ATLAS_PX
+from deixis_simulation.mixed_heads import mixed_head, reduced
 
 BASE = FITTING_AVATARS[1]
 
@@ -94,3 +95,8 @@ def test_long_hair_is_combed_behind_one_ear_or_into_the_face_and_cut() -> None:
     assert max(apart) > 0.05
     assert min(lowest) < -0.25
     assert max(lowest) > -0.2
+
+
+def test_of_one_avatar_alone_no_head_is_mixed() -> None:
+    with pytest.raises(AvatarError, match="mixed of two"):
+        mixed_head(BASE, [BASE], np.random.default_rng(0))

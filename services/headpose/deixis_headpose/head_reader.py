@@ -7,7 +7,7 @@ import math
 import numpy as np
 from deixis_runtime.lens import Pinhole
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import Point
+from deixis_schemas.messages import MAX_SIDE_PX, Point, Track
 
 from .head_crop import INPUT_PX, HeadPlace, crop_to_picture, cut_head
 from .regression import EARS_APART_M, Look, Regression
@@ -37,12 +37,12 @@ class HeadReader:
         if place is None:
             # By the track alone the crop may be far off: look once to find the head, and again to read it.
             place = HeadPlace(centre_of(sight.face), sight.face.bbox_px[2])
-            place = found_by(self._look(sight, place), place, sight.camera)
+            place = _held(found_by(self._look(sight, place), place, sight.camera), sight.face)
         look = self._look(sight, place)
         if look.head < LEAST_HEAD:
             self._place = None
             return None
-        self._place = _mixed(place, found_by(look, place, sight.camera))
+        self._place = _held(_mixed(place, found_by(look, place, sight.camera)), sight.face)
         self._track_px = centre_of(sight.face)
         return look
 
@@ -62,8 +62,13 @@ class HeadReader:
         at = self._place.centre_px[0] + x - self._track_px[0], self._place.centre_px[1] + y - self._track_px[1]
         if math.dist(at, (x, y)) > STRAYED * HeadPlace((x, y), width).side_px:
             return None
-        low, high = (limit * width for limit in WIDTH_LIMITS)
-        return HeadPlace(at, min(max(self._place.face_width_px, low), high))
+        return _held(HeadPlace(at, self._place.face_width_px), sight.face)
+
+
+def _held(place: HeadPlace, face: Track) -> HeadPlace:
+    """The place with a width that the track's box allows, and a message can say."""
+    low, high = (min(limit * face.bbox_px[2], MAX_SIDE_PX) for limit in WIDTH_LIMITS)
+    return HeadPlace(place.centre_px, min(max(place.face_width_px, low), high))
 
 
 def found_by(look: Look, place: HeadPlace, camera: Pinhole) -> HeadPlace:

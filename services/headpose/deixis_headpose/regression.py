@@ -23,7 +23,8 @@ LEAK = np.float32(0.1)
 LEAST_DEVIATION = 4.0
 """In crops with less contrast than this, grey levels, there is nothing but noise, and no head."""
 EARS_APART_M = 0.185
-"""Ear to ear of the people that it was fitted on, mean: what it takes a breadth for. A face (anatomy.py) is less wide."""
+"""Ear to ear of the people that it was fitted on, mean (tests/unit/test_headpose_regression.py measures it): what it takes a
+breadth for. A face (anatomy.py) is less wide."""
 BREADTH_MIDDLE, BREADTH_GAIN = -0.7, 2.0
 """The network tells the breadth as (log(breadth / side of the crop) - middle) * gain."""
 
