@@ -130,13 +130,13 @@ def _cut(picture: NDArray[np.uint8], linear: Floats, shift: Floats, rng: np.rand
         picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.45 / coarse), np.uint8)
     warp = np.hstack([linear * share, ((shift + 0.5) * share - 0.5)[:, None]])
     crop = cv2.warpAffine(picture, warp, (low, low), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
-    crop = _taken(np.asarray(crop, np.uint8), rng)
+    crop = taken(np.asarray(crop, np.uint8), rng)
     if low != INPUT_PX:
         crop = cv2.resize(crop, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_LINEAR)
     return np.asarray(crop, np.uint8)
 
 
-def _taken(crop: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def taken(crop: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
     """What a camera does to it: motion and lens blur, gamma, contrast, white balance, noise, compression."""
     if rng.random() < 0.25:
         crop = _moved(crop, rng)

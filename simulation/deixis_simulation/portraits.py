@@ -10,33 +10,28 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from .arms import hanging_arm
 from .avatars import WIGGED, Avatar, Picture, load_avatar
 from .body import Body, fit_body, head_share
 from .dice import Dice
-from .draw import HELD_OUT_FROM_SEED, draw_scene
 from .draw_bodies import draw_bodies
-from .draw_lens import Overrides, draw_sensor
-from .geometry import Floats, View, robot_at, view_at
-from .lights import lighting
+from .geometry import Floats, View
 from .mixed_heads import mixed_head, reduced
 from .portrait_arms import camera_bearing, direction_of, raised_arm
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
 from .rotations import about, unit
-from .scene import Light, Scene, Sensor
-from .sensor import SensorModel
+from .scene import Scene
 from .skeleton import SIDES, Posture, Skeleton, solve
 from .skinning import Mesh, skin
-from .stage import Stage
+from .studio import behind, draw_camera, draw_rooms, empty_room, light_person
 from .truth_head import MIRROR
 
 SIDE_PX, SIDE_M = 96, 0.5
 """A portrait is a square of so many pixels and, at the head's distance, about so many metres."""
-ROOMS, ROOM_SIZE = 24, (320, 240)
+ROOMS = 24
 VIEWS = 16
 """Portraits of one person in one light: posing and shadows cost more than a look."""
 BUST_M = 0.4
@@ -74,14 +69,14 @@ def portraits(seed: int, avatars: Sequence[str], count: int, rooms: int = ROOMS)
     Raises RenderError; AvatarError for fewer than two avatars.
     """
     rng = np.random.default_rng(seed)
-    scenes = _scenes(rng, rooms)
-    behind = [_empty_room(scene) for scene in scenes]
+    scenes = draw_rooms(rng, rooms)
+    pictures = [empty_room(scene) for scene in scenes]
     studios: dict[str, Renderer] = {}
     made = 0
     try:
         while made < count:
             scene = scenes[int(rng.integers(len(scenes)))]
-            for portrait in _sitting(rng, avatars, scene, behind, studios, min(VIEWS, count - made)):
+            for portrait in _sitting(rng, avatars, scene, pictures, studios, min(VIEWS, count - made)):
                 made += 1
                 yield portrait
     finally:
@@ -132,11 +127,11 @@ def _sitting(
     studio = _studio(avatar, studios)
     studio.repaint(0, avatar)
     studio.tint(0, Tints(drawn.skin_tint, drawn.hair_tint, drawn.clothes_tint))
-    _light(studio, scene.light, dice, skeleton, mesh)
-    sensor = SensorModel(_of_portrait_size(scene, draw_sensor(dice)))
+    light_person(studio, scene.light, dice, skeleton, mesh)
+    sensor = draw_camera(scene, dice, SIDE_PX)
     for number in range(count):
         view = _view(rng, skeleton, posture, hand)
-        picture = over(studio.people(view, smooth=number % 4 == 0), _background(rng, rooms))
+        picture = over(studio.people(view, smooth=number % 4 == 0), behind(rng, rooms, SIDE_PX))
         if number == 0:
             sensor.meter(picture)
         yield _portrait(rng, sensor.expose(picture, number, float(rng.uniform(0.6, 1.5))), skeleton, mesh, view)
@@ -170,19 +165,6 @@ def _posture(rng: np.random.Generator, body: Body) -> Posture:
         gaze=(float(np.clip(rng.normal(0, 12), -28, 28)), float(rng.normal(0, 6))),
         morphs=morphs,
     )
-
-
-def _of_portrait_size(scene: Scene, sensor: Sensor) -> Scene:
-    size = {"width": SIDE_PX, "height": SIDE_PX}
-    return scene.model_copy(update={"camera": scene.camera.model_copy(update=size), "sensor": sensor})
-
-
-def _light(renderer: Renderer, light: Light, dice: Dice, skeleton: Skeleton, mesh: Mesh) -> None:
-    # Lamps stand around the person as it faces; cameras go all the way round, so light comes from anywhere.
-    place = (dice.between(-1.5, 1.5), 0.0, dice.between(-1.5, 1.5))
-    renderer.light(lighting(light, place), np.zeros(3))
-    renderer.pose([mesh])
-    renderer.cast_people(skeleton.position("Head") - np.array([0.0, 0.3, 0.0]), 0.9)
 
 
 def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture, hand: Floats | None) -> View:
@@ -245,29 +227,3 @@ def _landmarks(avatar: Avatar, skeleton: Skeleton, mesh: Mesh) -> tuple[Floats, 
     found["right_eye"], found["left_eye"] = skeleton.position("RightEye"), skeleton.position("LeftEye")
     breadth = float(np.linalg.norm(found["left_ear"] - found["right_ear"]))
     return np.array([found[name] for name in LANDMARKS]), breadth
-
-
-# --- behind the person ---------------------------------------------------------------------------------------------------
-
-
-def _background(rng: np.random.Generator, rooms: Sequence[FloatPicture]) -> FloatPicture:
-    room = rooms[int(rng.integers(len(rooms)))]
-    side = int(rng.integers(SIDE_PX // 2, min(room.shape[:2])))
-    top, left = (int(rng.integers(0, size - side + 1)) for size in room.shape[:2])
-    part = room[top : top + side, left : left + side] * np.float32(rng.uniform(0.3, 1.5))
-    return np.asarray(cv2.resize(part, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _scenes(rng: np.random.Generator, count: int) -> list[Scene]:
-    """Scenes whose empty rooms, lights and cameras the portraits are taken in; of fitting seeds."""
-    seeds = rng.choice(HELD_OUT_FROM_SEED, count, replace=False)
-    return [draw_scene(int(seed), 0, overrides=Overrides(size=ROOM_SIZE)) for seed in seeds]
-
-
-def _empty_room(scene: Scene) -> FloatPicture:
-    """Linear light (h, w, 3) of a scene without its people."""
-    stage = Stage(scene.model_copy(update={"people": []}), [])
-    try:
-        return stage.picture(view_at(scene.camera, robot_at(scene.robot_path, 0.0)), [])
-    finally:
-        stage.close()
