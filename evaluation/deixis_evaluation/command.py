@@ -32,10 +32,11 @@ from .slices import Slice, slices_of
 from .stand_ins import read_stages, say_blind
 from .summary import summarise
 from .table import print_scores, say_truth
+from .tracker_command import check_tracker, run_tracker
 
 TABLE_WIDTH = 150
 """Of a table that goes to a file: a terminal has its own."""
-SCORED_ALONE = ("headpose",)
+SCORED_ALONE = ("headpose", "tracker")
 """Stages that `--stage` knows."""
 
 
@@ -77,7 +78,9 @@ def register(subparsers: Any) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Score the clips. 0 when all were played, 1 when one was not. Raises CommandError or HostFailed."""
-    return _run_system(given) if given.stage is None else _run_headpose(given)
+    if given.stage is None:
+        return _run_system(given)
+    return _run_headpose(given) if given.stage == "headpose" else _run_tracker(given)
 
 
 def _run_system(given: argparse.Namespace) -> int:
@@ -106,6 +109,16 @@ def _run_headpose(given: argparse.Namespace) -> int:
     check_writable(given.json)
     conditions = HeadposeConditions(chosen.folder, chosen.seeds, given.truth, sets)
     return run_headpose(chosen, setup, conditions, given.out, given.json, _console())
+
+
+def _run_tracker(given: argparse.Namespace) -> int:
+    if given.out is not None:
+        raise CommandError("--out: with --stage tracker nothing is drawn; --json keeps its figures")
+    sets = stage_settings(given.sets)
+    config = check_tracker(given.truth, sets)
+    chosen = _choose(given)
+    check_writable(given.json)
+    return run_tracker(chosen, config, sets, given.json, _console())
 
 
 def _choose(given: argparse.Namespace) -> Chosen:

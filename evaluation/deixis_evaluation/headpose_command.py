@@ -5,29 +5,26 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import cv2
 from deixis_cli.options import CommandError
 from deixis_headpose.config import HeadposeConfig
-from deixis_runtime.settings import CommonOptions, ConfigError, StageConfig, load_config
 from deixis_tracker.config import TrackerConfig
 from rich.console import Console
 
 from .chosen_clips import Chosen
 from .clip_progress import played
+from .core_config import core_config
 from .headpose_play import HeadposeSetup, evaluate_heads
 from .headpose_report import HeadposeConditions, headpose_report
 from .headpose_scores import HeadposeScore
 from .headpose_table import print_headpose
 from .json_file import write_json
 from .machine import describe_machine, say_machine
-from .replay import INSTANCE
 
 BEFORE = "tracker"
 """The stage that headpose is fed by: the truth can stand for it, and it can be set."""
 Draw = Callable[[Path, HeadposeScore], None]
-C = TypeVar("C", bound=StageConfig)
 
 
 def check_headpose(truth: Sequence[str], sets: Mapping[str, Sequence[str]]) -> HeadposeSetup:
@@ -40,8 +37,8 @@ def check_headpose(truth: Sequence[str], sets: Mapping[str, Sequence[str]]) -> H
         if stage not in played_stages:
             raise CommandError(f"--set {stage}: with --stage headpose only {' and '.join(played_stages)} are played")
     return HeadposeSetup(
-        tracker=_config("tracker", TrackerConfig, sets),
-        headpose=_config("headpose", HeadposeConfig, sets),
+        tracker=core_config("tracker", TrackerConfig, sets),
+        headpose=core_config("headpose", HeadposeConfig, sets),
         true_tracks=BEFORE in truth,
     )
 
@@ -88,20 +85,3 @@ def drawer(out: Path | None) -> Draw:
         hint = "pip install 'deixis-evaluation[plots]'"
         raise CommandError(f"--out draws with matplotlib, which cannot be loaded: {error} ({hint})") from None
     return draw_heads
-
-
-def _config(stage: str, model: type[C], sets: Mapping[str, Sequence[str]]) -> C:
-    options = CommonOptions(
-        robot="eval",
-        instance=INSTANCE,
-        connect="",
-        lockstep=True,
-        supervised=False,
-        started_before=0,
-        site=None,
-        sets=tuple(sets.get(stage, ())),
-    )
-    try:
-        return load_config(stage, model, options)
-    except ConfigError as error:
-        raise CommandError(str(error)) from None
