@@ -2,7 +2,6 @@ import cv2
 import numpy as np
 import pytest
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.faces import plan_jobs
 from deixis_tracker.tracker import FrameRefused, Tracker
 from pydantic import ValidationError
 
@@ -38,14 +37,6 @@ def test_what_is_no_frame_is_refused_with_the_cause(image, says):
 def test_an_unknown_setting_is_refused_by_name():
     with pytest.raises(ValidationError, match="hand_lenght"):
         TrackerConfig(hand_lenght=1.0)
-
-
-def test_no_piece_of_the_face_search_is_larger_than_the_budget_of_a_frame():
-    config = TrackerConfig()
-    jobs = plan_jobs(480, 640, config)
-    assert max(job.megapixels for job in jobs) <= config.search_budget_mpx
-    assert min(job.scale for job in jobs) < 0.1
-    assert max(job.scale for job in jobs) > 0.8
 
 
 @pytest.fixture

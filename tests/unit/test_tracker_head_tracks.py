@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
-from deixis_tracker.background import Background
+from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.finder import Finder
 from deixis_tracker.frame import Step, Views, coarsened
 from deixis_tracker.head_tracks import HeadTracks
 from deixis_tracker.heads import HeadColours
@@ -35,9 +36,11 @@ def views_of(image):
 
 def test_a_head_that_leaves_the_picture_between_two_frames_is_let_go():
     views = views_of(np.full((480, 640, 3), 90, np.uint8))
-    heads = HeadTracks((480, 640), TrackerConfig(), count(), count())
+    heads = HeadTracks((480, 640), TrackerConfig(), Finder(), count(), count())
     heads.persons.append(person_at(900, 200))
-    heads.update(views, Background(views.coarse, 20), views.changed, SkinModel(0.2), Step(PERIOD_NS, PERIOD_NS, PERIOD_NS))
+    heads.update(
+        views, Background(views.coarse, 20), MotionHistory(views.coarse), SkinModel(0.2), Step(PERIOD_NS, PERIOD_NS, PERIOD_NS)
+    )
     assert heads.persons == []
 
 

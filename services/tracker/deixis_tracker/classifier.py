@@ -22,6 +22,7 @@ HANGING_BELOW = 2.0  # head widths below the head
 RATE_PER_S = 8.0  # independent observations a second
 MEMORY = 7.0  # most log odds that are kept
 RAISED_SAYS = 2.0  # most log odds that the place of a raised hand gives to its side
+SHAPE, MOST_SHAPE = 0.4, 3.0  # share of the finder's log odds that counts, and most of them
 RAISED = 1.2  # what is skin-coloured and stands out from the room high up is likelier a hand
 
 
@@ -34,10 +35,16 @@ class Features(NamedTuple):
     area: float
     evidence: float  # share of the blob that moved or changed against the background, 0 to 1
     sure: float  # mean P(skin) of the blob, 0 to 1
+    right: float = 0.0  # log odds that the finder gives to a right hand there, and to a left one; 0 says nothing
+    left: float = 0.0
 
 
 def _normal(value: float, mean: float, sigma: float) -> float:
     return -0.5 * ((value - mean) / sigma) ** 2 - math.log(sigma)
+
+
+def _shape(odds: float) -> float:
+    return SHAPE * max(-MOST_SHAPE, min(odds, MOST_SHAPE))
 
 
 def log_likelihoods(f: Features) -> dict[HandKind, float]:
@@ -52,8 +59,8 @@ def log_likelihoods(f: Features) -> dict[HandKind, float]:
     if f.dy < HANGING_BELOW:
         hand += RAISED
     return {
-        "left_hand": hand + _normal(f.dx, mean, sigma),
-        "right_hand": hand + _normal(f.dx, -mean, sigma),
+        "left_hand": hand + _normal(f.dx, mean, sigma) + _shape(f.left),
+        "right_hand": hand + _normal(f.dx, -mean, sigma) + _shape(f.right),
         "unknown": other + _normal(f.dx, 0.0, 3.0),
     }
 

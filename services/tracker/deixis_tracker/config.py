@@ -16,20 +16,17 @@ class TrackerConfig(StageConfig):
         description="Larger pictures are scaled down to this width for tracking; pixels published are of the frame.",
     )
     max_persons: int = Field(default=4, ge=1, le=16, description="Most persons tracked at a time.")
-    min_face_px: int = Field(default=22, ge=16, le=400, description="Smallest face looked for, pixels of the working picture.")
-    max_face_share: float = Field(
-        default=0.6, gt=0.05, le=1, description="Largest face looked for, share of the picture's height."
+    min_head_px: int = Field(default=8, ge=6, le=400, description="Narrowest head looked for, pixels of the working picture.")
+    max_head_share: float = Field(
+        default=0.9, gt=0.05, le=1, description="Widest head looked for, share of the picture's height."
     )
-    search_budget_mpx: float = Field(
-        default=0.075,
-        gt=0.005,
-        le=10,
-        description="Area the face detector may search per frame, megapixels over all scales; bounds the time of a frame.",
+    confirm_odds: float = Field(
+        default=1.8,
+        gt=0,
+        le=30,
+        description="What looks, each worth 1 at most, add up to before a head is believed.",
     )
-    confirm_hits: int = Field(default=3, ge=1, le=20, description="Detections in separate frames before a face is believed.")
-    lose_face_after_s: float = Field(
-        default=2.5, gt=0, le=60, description="A face not supported by the picture for so long is dropped."
-    )
+    lose_face_after_s: float = Field(default=2.5, gt=0, le=60, description="A head not seen as one for so long is dropped.")
     lose_hand_after_s: float = Field(default=0.5, gt=0, le=60, description="A hand not seen for so long is dropped.")
     prior_skin: float = Field(default=0.2, gt=0, lt=1, description="Share of skin expected among the pixels judged.")
     skin_high: int = Field(default=150, ge=1, le=255, description="A blob needs a pixel with this P(skin), of 255.")

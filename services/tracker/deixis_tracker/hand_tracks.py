@@ -9,6 +9,7 @@ import numpy as np
 
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND
 from deixis_tracker.frame import Step
 from deixis_tracker.hands import Hand, cut_hand, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
@@ -22,6 +23,8 @@ LEAP, MOST_LEAP = 0.5, 3.0  # head widths between two sightings of one hand, bes
 UNSEEN_SPEED_KEPT = 0.6**30  # of a hand that is not seen, per second
 EVIDENCE_KEPT = 0.995**30  # per second
 LEAST_SUPPORT = 0.15
+DOUBTFUL = 1.0  # log odds of the finder that speak neither for a hand nor against it
+ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
 LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
 Claim = tuple[Person, HandTrack]
@@ -107,12 +110,13 @@ class HandTracks:
         track.blob, track.seen_ns = hand, step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
-        track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence)
+        track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(_odds(person, hand))))
 
     def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
         """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
         x, y = blob.x0 + blob.mask.shape[1] / 2, blob.y0 + blob.mask.shape[0] / 2
-        person = min(persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
+        owners = [person for person in persons if person.person_id == blob.owner]
+        person = min(owners or persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
         hand = self._cut(person, blob, None, x)
         if hand is None or person.distance(*hand.centroid) > self._config.reach:
             return
@@ -167,7 +171,20 @@ def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob) -> Featu
     w = person.width
     speed = math.hypot(track.motion.vx, track.motion.vy) / w
     dx, dy = (track.motion.x - person.x) / w, (track.motion.y - person.y) / w
-    return Features(dx, dy, speed, hand.area / w**2, blob.evidence, blob.sure)
+    right, left = _odds(person, hand)
+    return Features(dx, dy, speed, hand.area / w**2, max(blob.evidence, _share(max(right, left))), blob.sure, right, left)
+
+
+def _odds(person: Person, hand: Hand) -> tuple[float, float]:
+    """The finder's log odds of a right and of a left hand there; 0 where it has not looked."""
+    if person.around is None:
+        return 0.0, 0.0
+    right, left = (person.around.odds_near(kind, *hand.centroid, ODDS_NEAR * person.width) for kind in (RIGHT_HAND, LEFT_HAND))
+    return (right - DOUBTFUL, left - DOUBTFUL) if math.isfinite(right) else (0.0, 0.0)
+
+
+def _share(odds: float) -> float:
+    return 1 / (1 + math.exp(-max(-20.0, min(odds, 20.0)))) if odds else 0.0
 
 
 def _lost_hand(person: Person, hand: Hand, step: Step) -> HandTrack | None:

@@ -1,21 +1,25 @@
 """Follows the heads of all persons, finds new ones and lets go of those lost.
 
-A head is followed by its colours and outline (`heads.py`). Several times a second its face is looked for from the front, which
-corrects its place and width, teaches the colour of its skin, and is published for those who estimate its pose.
+A head is followed by its shape (`finder.py`) and, where that is covered, by its colours and outline (`heads.py`). Several times
+a second its face is looked for from the front, which corrects its place and width, teaches the colour of its skin, and is
+published for those who estimate its pose.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import cv2
 import numpy as np
 
-from deixis_tracker.background import Background
+from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.faces import FaceSearch, look, measure
-from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around, repeated, to_frame
-from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder, Walkers, silhouette_heads
+from deixis_tracker.faces import look, measure
+from deixis_tracker.finder import Finder, Seen
+from deixis_tracker.frame import COARSE, Box, Image, Step, Views, around, repeated, to_frame
+from deixis_tracker.head_search import HeadSearch
+from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import Person
 from deixis_tracker.skin import SkinModel
@@ -33,49 +37,65 @@ AWAY_S, BACK_FOR_S = 0.3, 0.5
 NEW_FOR_S, NEW_SIGHTINGS = 0.5, 5  # a new face is measured in each frame
 LEARN_COLOURS_S = 1 / 15
 SKIN_FROM_EVERY = 3  # sightings of the face
-MOST_IN_FRONT = 2.5  # a face on the body of a tracked person is a shirt, unless it is so much larger: somebody in front
+SHAPE_S = 1 / 15  # what is around a head is looked at so often: it costs a third of a frame
+SEEN_ODDS = 0.5  # log odds of the finder from which on it sees the head
+NEAR, SAME = 0.8, 0.5  # head widths: the finder's head is so near the prediction; of two heads that are one
+SHAPE_SIGMA, COLOURS_AGREE = 0.08, 0.35  # head widths
+WIDTH_RATE, WIDTH_OFF = 0.1, 0.25  # how fast the finder's width is taken, and by how much it is off where a face told it
+LEARN_SKIN_S, LEAST_SKIN = 0.5, 0.12
 
 
 class HeadTracks:
     """The persons in view, by their heads."""
 
-    def __init__(self, size: tuple[int, int], config: TrackerConfig, person_ids: Iterator[int], ids: Iterator[int]) -> None:
+    def __init__(
+        self, size: tuple[int, int], config: TrackerConfig, finder: Finder, person_ids: Iterator[int], ids: Iterator[int]
+    ) -> None:
         """For working pictures of `size` (height, width); `ids` number the tracks."""
         self.persons: list[Person] = []
         self.left_out = 0  # faces found and not followed in this frame, for there are `max_persons` already
         self._size = size
         self._config = config
         self._person_ids, self._ids = person_ids, ids
-        self._search = FaceSearch(*size, config)
-        self._walkers = Walkers()
-        self._finder = HeadFinder()
+        self._shapes = finder
+        self._search = HeadSearch(*size, config, finder)
+        self._colours = HeadFinder()
 
-    def update(self, views: Views, room: Background, people: Mask, skin: SkinModel, step: Step) -> None:
-        """Follow all heads in the next frame. `people`: where they were in the last one, coarse."""
+    def update(self, views: Views, room: Background, motion: MotionHistory, skin: SkinModel, step: Step) -> None:
+        """Follow all heads in the next frame."""
         self.left_out = 0
         for person in self.persons:
             self._follow(person, views, skin, step)
         self._drop_lost(skin, step)
+        self._drop_doubles(skin)
         for person in self.persons:
             person.skin_centre = self._centre_of_skin(person, views.skin)
-        self._find_faces(views, room, skin, step)
-        self._find_walkers(views, room, people, step)
+        self._find_heads(views, room, motion, step)
         self._measure_faces(views, step)
 
     # --- those known --------------------------------------------------------------------------------------------------
 
     def _follow(self, person: Person, views: Views, skin: SkinModel, step: Step) -> None:
         person.motion.predict(step.passed_s)
+        seen = None
+        if step.periods(SHAPE_S, person.person_id * STAGGERED_S):
+            person.around = self._shapes.around(views.full, person.x, person.y, person.width)
+            seen = self._seen_as_shape(person)
         picture, scale = (views.coarse, COARSE) if person.width >= LEAST_COARSE_HEAD_PX else (views.full, 1.0)
-        found = self._finder.find(picture, person.colours, scale * person.x, scale * person.y, scale * person.width, 0.5)
-        person.support = found.support
-        person.observed = found.support >= LEAST_SUPPORT
+        found = self._colours.find(picture, person.colours, scale * person.x, scale * person.y, scale * person.width, 0.5)
+        x, y = found.x / scale, found.y / scale
         covered = self._hand_before(person)
-        if person.observed:
+        person.support = found.support
+        person.observed = seen is not None or found.support >= LEAST_SUPPORT
+        # Colours are trusted as far as the shape agrees: on a wall of their kind they wander off.
+        agrees = seen is None or math.hypot(x - seen.x, y - seen.y) < COLOURS_AGREE * person.width
+        if found.support >= LEAST_SUPPORT and agrees:
+            person.motion.correct(x, y, person.width * (0.5 if covered else 0.06 + 0.1 * max(0.0, 0.5 - found.support)))
+        if seen is not None:
             person.seen_ns = step.now_ns
-            sigma = person.width * (0.5 if covered else 0.06 + 0.1 * max(0.0, 0.5 - found.support))
-            person.motion.correct(found.x / scale, found.y / scale, sigma)
-        else:
+            person.motion.correct(seen.x, seen.y, SHAPE_SIGMA * person.width)
+            self._correct_width(person, seen)
+        if not person.observed:
             person.motion.damp(step.kept(UNSEEN_SPEED_KEPT))
         if step.periods(LOOK_S, person.person_id * STAGGERED_S):
             self._look_again(person, views, skin, covered, step)
@@ -84,13 +104,33 @@ class HeadTracks:
             place = scale * person.x, scale * person.y, scale * person.width
             person.colours.learn(picture, *place, repeated(0.03, lessons))
 
+        if seen is not None and not covered and step.periods(LEARN_SKIN_S) and _skin_share(person, views.skin) >= LEAST_SKIN:
+            _learn_skin(person, views.full, skin)
+
+    def _seen_as_shape(self, person: Person) -> Seen | None:
+        """The head as the finder sees it near the prediction, and nearer to no other head."""
+        assert person.around is not None
+        near = []
+        for seen in person.around.heads(SEEN_ODDS):
+            away = person.distance(seen.x, seen.y)
+            nearest = min(self.persons, key=lambda p: p.distance(seen.x, seen.y))
+            if away < NEAR and nearest is person:
+                near.append((seen.odds - 4 * away, seen))
+        return max(near, key=lambda pair: pair[0])[1] if near else None
+
+    @staticmethod
+    def _correct_width(person: Person, seen: Seen) -> None:
+        off = seen.width / person.width - 1
+        if not person.sightings or abs(off) > WIDTH_OFF:
+            person.width *= 1 + WIDTH_RATE * max(-0.5, min(off, 0.5))
+
     def _look_again(self, person: Person, views: Views, skin: SkinModel, covered: bool, step: Step) -> None:
         """Correct a head by its frontal face, where that is to be seen. `covered`: a hand is before it."""
         seen = _look(person, views)
         if seen is None:
             return
         if not covered:
-            if step.now_ns - person.face_ns > AWAY_S * 1e9:
+            if person.sightings and step.now_ns - person.face_ns > AWAY_S * 1e9:
                 person.back_ns = step.now_ns
             person.face_ns = step.now_ns
         person.sightings += 1
@@ -127,6 +167,14 @@ class HeadTracks:
             self.persons.remove(person)
             skin.forget_person(person.person_id)
 
+    def _drop_doubles(self, skin: SkinModel) -> None:
+        """Of two persons on one head the younger goes."""
+        for person in sorted(self.persons, key=lambda p: -p.person_id):
+            others = [p for p in self.persons if p.person_id < person.person_id]
+            if any(math.hypot(person.x - p.x, person.y - p.y) < 0.5 * SAME * max(person.width, p.width) for p in others):
+                self.persons.remove(person)
+                skin.forget_person(person.person_id)
+
     def _left_picture(self, person: Person) -> bool:
         height, width = self._size
         margin = 0.3 * person.width
@@ -146,44 +194,33 @@ class HeadTracks:
 
     # --- new ones -----------------------------------------------------------------------------------------------------
 
-    def _find_faces(self, views: Views, room: Background, skin: SkinModel, step: Step) -> None:
+    def _find_heads(self, views: Views, room: Background, motion: MotionHistory, step: Step) -> None:
         self._search.search(views, len(self.persons), step)
-        self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, HEAD_PER_BOX * c.width)]
-        for face in self._search.confirmed(views, step):
-            width = HEAD_PER_BOX * face.width
-            person = self._add(face.x, face.y - BOX_BELOW_HEAD * width, width, views, room, step)
-            if person is not None:
-                _learn_skin(person, views.full, skin)
-
-    def _find_walkers(self, views: Views, room: Background, people: Mask, step: Step) -> None:
-        heads = [] if room.unstable else silhouette_heads(views.changed, views.skin, people)
-        for head in self._walkers.believed(heads, step):
+        self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, c.width)]
+        self._search.disturb(self.persons, room.unstable, step)
+        for head in self._search.confirmed(views, motion, step):
             self._add(head.x, head.y, head.width, views, room, step)
 
-    def _add(self, x: float, y: float, width: float, views: Views, room: Background, step: Step) -> Person | None:
-        """A new person whose head was found with its centre at (x, y); None where it is not new, or one too many."""
+    def _add(self, x: float, y: float, width: float, views: Views, room: Background, step: Step) -> None:
+        """A new person whose head was found with its centre at (x, y), unless it is not new, or one too many."""
         if self._is_known(x, y, width):
-            return None
+            return
         if len(self.persons) >= self._config.max_persons:
             self.left_out += 1
-            return None
+            return
         motion = PointFilter(x, y, 0.1 * width, HEAD_ACCELERATION * width)
         now_ns = step.now_ns
-        person = Person(next(self._person_ids), next(self._ids), motion, width, HeadColours(), now_ns, now_ns, now_ns)
+        person = Person(next(self._person_ids), next(self._ids), motion, width, HeadColours(), now_ns, now_ns)
+        person.around = self._shapes.around(views.full, x, y, width)
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
         self.persons.append(person)
         rows, columns = person.head_box().scaled(COARSE).window(*views.changed.shape)
         if views.changed[rows, columns].mean() < 0.5 * 255:  # was here when the room was learned
             room.mark_unknown(person.resting_hands_box().scaled(COARSE))
-        return person
 
     def _is_known(self, x: float, y: float, width: float) -> bool:
-        """A face cannot be where a tracked head or the body below it is."""
-        for p in self.persons:
-            dx, dy = abs(x - p.x) / p.width, (y - p.y) / p.width
-            if dx < 1.2 and -1.2 < dy < 6 and width < MOST_IN_FRONT * p.width:
-                return True
-        return False
+        """Whether a head is one that is followed already."""
+        return any(math.hypot(x - p.x, y - p.y) < SAME * max(width, p.width) for p in self.persons)
 
 
 def _measuring_is_due(person: Person, step: Step) -> bool:
@@ -196,6 +233,13 @@ def _measuring_is_due(person: Person, step: Step) -> bool:
 def _look(person: Person, views: Views) -> Box | None:
     """The Haar box of a person's face, where it is seen from the front."""
     return look(views.grey, person.x, person.y + BOX_BELOW_HEAD * person.width, person.width)
+
+
+def _skin_share(person: Person, skin: Image) -> float:
+    """Mean P(skin), of a coarse map, in the middle of a head, 0 to 1."""
+    half = 0.25 * person.width
+    rows, columns = around(person.x, person.y, half, half, half, half).scaled(COARSE).window(*skin.shape)
+    return float(skin[rows, columns].mean()) / 255 if skin[rows, columns].size else 0.0
 
 
 def _learn_skin(person: Person, work: Image, skin: SkinModel) -> None:

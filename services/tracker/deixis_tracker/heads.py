@@ -1,24 +1,20 @@
-"""Heads whose face is not to be seen from the front: followed through turns, and found on top of silhouettes.
+"""Heads whose face is not to be seen from the front, followed through turns by their colours and outline.
 
 A head is hair and skin in front of something else. From the picture in which its face was found, the colours inside the
 head's ellipse and around it are learned; in each frame an ellipse with a bright inside and a dark outside (above and beside
 the head; below are neck and shirt) is laid over the map of P(head | colour), and the best place near the prediction is the
 head. Profile and back of the head keep colour and outline, so the centre stays that of the head through any turn.
-
-Somebody who walks past in profile differs from an empty room from head to foot, so the head is the top of the changed region;
-skin in it tells a person from a door that opens.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from deixis_tracker.frame import COARSE, Image, Mask, Step, around
+from deixis_tracker.frame import Image, around
 from deixis_tracker.skin import look_up
 
 Map = NDArray[np.float32]
@@ -29,12 +25,6 @@ CELLS_PER_WIDTH = 16
 SEARCH = 0.55  # head widths around the prediction
 BINS = 16
 LEAST_SUPPORT = 0.12
-SHRINK = 2  # of the coarse masks
-LEAST_HEIGHT_PX = 45
-LEAST_SLENDERNESS = 1.5  # height over width
-WALKER_SKIN = 60  # P(skin) of 255
-WALKER_S = 0.13  # a silhouette's head is believed when it was seen in all frames for so long
-WALKER_LEAP, WALKER_SPEED = 0.3, 9.0  # between two frames: head widths, and head widths per second
 
 
 @dataclass
@@ -143,70 +133,3 @@ def _parabola(line: Map, k: int) -> float:
     left, middle, right = (float(v) for v in line[k - 1 : k + 2])
     bend = left - 2 * middle + right
     return 0.0 if bend >= 0 else max(-0.5, min(0.5, 0.5 * (left - right) / bend))
-
-
-class WalkerHead(NamedTuple):
-    """Centre of a silhouette's head and the width of a head from the front, pixels; since when it was seen."""
-
-    x: float
-    y: float
-    width: float
-    since_ns: int = 0
-
-
-class Walkers:
-    """Heads of silhouettes, believed when seen for a while, each near where it was in the frame before."""
-
-    def __init__(self) -> None:
-        self._last: list[WalkerHead] = []
-
-    def believed(self, seen: list[WalkerHead], step: Step) -> list[WalkerHead]:
-        """Of the heads seen in this frame, those believed."""
-        self._last = [head._replace(since_ns=self._since(head, step)) for head in seen]
-        return [head for head in self._last if step.now_ns - head.since_ns >= WALKER_S * 1e9]
-
-    def _since(self, head: WalkerHead, step: Step) -> int:
-        reach = (WALKER_LEAP + WALKER_SPEED * step.passed_s) * head.width
-        before = [w.since_ns for w in self._last if abs(w.x - head.x) < reach and abs(w.y - head.y) < 0.5 * head.width]
-        return min(before, default=step.now_ns)
-
-
-def silhouette_heads(changed: Mask, skin: Image, people: Mask) -> list[WalkerHead]:
-    """Heads on top of changed regions, in pixels of the working picture, outside of `people` (255 where somebody is tracked).
-
-    All pictures are coarse.
-    """
-    size = (changed.shape[1] // SHRINK, changed.shape[0] // SHRINK)
-    small = cv2.resize(cv2.bitwise_and(changed, cv2.bitwise_not(people)), size, interpolation=cv2.INTER_AREA)
-    solid = cv2.morphologyEx(np.asarray(small > 100, np.uint8), cv2.MORPH_CLOSE, np.ones((5, 3), np.uint8))
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(solid, connectivity=8)
-    heads = []
-    for k in range(1, count):
-        x, y, w, h, area = (int(v) for v in stats[k])
-        if h * SHRINK < LEAST_HEIGHT_PX or h < LEAST_SLENDERNESS * w or area < 0.25 * w * h or x == 0 or x + w == size[0]:
-            continue
-        head = _top_of(np.asarray(labels[y : y + h, x : x + w] == k, np.uint8), x, y)
-        if head is not None and _has_skin(head, skin):
-            heads.append(WalkerHead(head.x / COARSE, head.y / COARSE, head.width / COARSE))
-    return heads
-
-
-def _top_of(mask: Mask, x0: int, y0: int) -> WalkerHead | None:
-    """The head on top of one silhouette, in pixels of the coarse picture: rows from the top until the shoulders widen."""
-    rows = mask.sum(axis=1)
-    longest = max(3, len(rows) // 6)
-    width = float(np.median(rows[: max(2, longest * 2 // 3)]))
-    shoulders = float(np.median(rows[longest + 1 : 2 * longest + 2]))
-    if width < 3 or shoulders < 1.15 * width:
-        return None
-    columns = np.nonzero(mask[: round(1.3 * width)])[1]
-    # A head in profile is about 1.25 of its widths deep.
-    head = width * SHRINK / 1.25
-    return WalkerHead((x0 + float(columns.mean()) + 0.5) * SHRINK, y0 * SHRINK + 0.68 * head, head)
-
-
-def _has_skin(head: WalkerHead, skin: Image) -> bool:
-    half = 0.6 * head.width
-    top, left = max(0, int(head.y - half)), max(0, int(head.x - half))
-    part = skin[top : int(head.y + half), left : int(head.x + half)]
-    return part.size > 0 and float(np.count_nonzero(part > WALKER_SKIN)) / part.size > 0.15

@@ -15,6 +15,7 @@ from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_schemas.messages import FrontalFace, KindProbabilities, Track
 
 from deixis_tracker.classifier import HandBelief, HandKind
+from deixis_tracker.finder import Surroundings
 from deixis_tracker.frame import COARSE, Box, Mask, around, to_frame
 from deixis_tracker.hands import Hand, outline
 from deixis_tracker.heads import HeadColours
@@ -64,15 +65,16 @@ class Person:
     colours: HeadColours
     since_ns: int
     seen_ns: int
-    face_ns: int  # when its face was seen from the front and uncovered last
+    face_ns: int = -(10**18)  # when its face was seen from the front and uncovered last
     back_ns: int = -(10**18)  # when it was seen so again, after it was turned away or covered
     support: float = 1.0
     observed: bool = True
-    sightings: int = 1  # of a frontal face, that corrected the head
+    sightings: int = 0  # of a frontal face, that corrected the head
     measured: int = 0  # times
     frontal: FrontalFace | None = None  # as measured in this frame, in its pixels
     skin_centre: tuple[float, float] | None = None
     hands: list[HandTrack] = field(default_factory=list)
+    around: Surroundings | None = None  # what the finder sees around the head in this frame
 
     @property
     def x(self) -> float:

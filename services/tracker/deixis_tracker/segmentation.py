@@ -28,6 +28,7 @@ class Blob(NamedTuple):
     area: int
     evidence: float  # share that changed against the room or moved lately
     sure: float  # mean P(skin)
+    owner: int | None = None  # person_id of whose hand it is, where that is known
 
 
 def head_zone(shape: tuple[int, int], persons: list[Person], rim: float) -> Mask:

@@ -1,6 +1,6 @@
 """The tracker: frames in, face and hand tracks out (Pateraki et al. 2011, sec. 4).
 
-One frame passes: background -> skin colour -> faces and heads -> hand blobs -> association by propagated pixel hypotheses ->
+One frame passes: background -> skin colour -> heads and faces -> hand blobs -> association by propagated pixel hypotheses ->
 hand cut from the arm -> Kalman filter -> classifier.
 """
 
@@ -16,6 +16,8 @@ from deixis_schemas.runs import RunClock
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import load_cascade
+from deixis_tracker.finder import Finder
+from deixis_tracker.found_hands import found_hands
 from deixis_tracker.frame import Image, Mask, Step, Views, coarsened
 from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.head_tracks import HeadTracks
@@ -40,6 +42,7 @@ class Tracker:
         load_cascade()  # now, not within the first frame
         SkinModel(config.prior_skin)
         self._config = config
+        self._finder = Finder()
         self._clock = RunClock()
         self._began_ns = 0
         self._shape: tuple[int, int] = (0, 0)
@@ -79,17 +82,18 @@ class Tracker:
         self._room = Background(coarse, self._config.change_threshold)
         self._motion = MotionHistory(coarse)
         self._skin = SkinModel(self._config.prior_skin)
-        self._heads = HeadTracks(size, self._config, self._person_ids, self._track_ids)
+        self._heads = HeadTracks(size, self._config, self._finder, self._person_ids, self._track_ids)
         self._hands = HandTracks(size, self._config, self._track_ids)
         self._people: Mask = np.zeros(coarse.shape[:2], np.uint8)
 
     def _step(self, image: Image, work: Image, scale: float, step: Step) -> None:
         views = self._view(image, work, scale)
         self._motion.update(views.coarse, step)
-        self._heads.update(views, self._room, self._people, self._skin, step)
+        self._heads.update(views, self._room, self._motion, self._skin, step)
         persons = self._heads.persons
         if persons:
             blobs = hand_blobs(views, self._skin, self._room, self._motion, persons, self._config)
+            blobs += found_hands(views, persons, blobs, self._config)
             self._hands.update(persons, blobs, step)
         self._people = people_mask(persons, (views.skin.shape[0], views.skin.shape[1]))
         self._room.update(views.coarse, views.changed, self._people, step)

@@ -1,0 +1,152 @@
+"""Finder of heads and hands by their shape, whatever their colour: from the front, in profile, from behind, of grey cameras.
+
+A small network of convolutions (`finder.onnx`, 1 MB) answers with maps, a cell for STRIDE x STRIDE pixels: log odds that the
+middle of a head, of somebody's right hand or of the left one is there, and how wide that head is. It knows heads about
+6.5 to 30 pixels wide, so a picture is searched at several sizes, and the surroundings of a known head are scaled to the one
+that it knows best. It was fitted on the simulator's fitting people alone (`fitting/fit_finder.py`).
+
+OpenCV's `dnn` runs it: it comes with the OpenCV that the tracker needs anyway, and its convolutions are quicker than numpy's.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from deixis_schemas.anatomy import HEAD_WIDTH_M
+from numpy.typing import NDArray
+
+from deixis_tracker.frame import Image
+
+Maps = NDArray[np.float32]
+
+STRIDE, GRAIN = 4, 16  # pixels of a cell; what the sides of its pictures are multiples of
+USUAL_PX = 12.0  # width of a head in the surroundings of a known one
+PIXEL_MIDDLE, PIXEL_SPREAD = 115.0, 60.0
+WIDTH_PER_BREADTH = HEAD_WIDTH_M / 0.185  # width of a head, by its breadth ear to ear, which the network was fitted to
+KNOWN_PX = (6.5, 30.0)  # breadths of heads that it knows
+HEAD, RIGHT_HAND, LEFT_HAND, BREADTH = range(4)
+LEAST_SIDE_PX = 48  # a smaller picture shows no head with what is around it
+WIDE, ABOVE, BELOW = 5.3, 4.0, 6.7  # surroundings of a head that are looked at, head widths; an arm is about 4.5 long
+NEAREST = 0.6  # two heads of one picture are so many widths apart, at least
+
+
+class Seen(NamedTuple):
+    """A place (x, y) in pixels of the picture, and the log odds of the thing being there; of heads: their width, pixels."""
+
+    x: float
+    y: float
+    odds: float
+    width: float = 0.0
+
+
+class Surroundings:
+    """Maps of what is around a head; places and lengths of the picture they were made from."""
+
+    def __init__(self, maps: Maps, x0: float, y0: float, scale: float) -> None:
+        """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
+        self._maps = maps
+        self._x0, self._y0, self._scale = x0, y0, scale
+
+    def heads(self, least: float) -> list[Seen]:
+        """Heads of so high log odds, best first."""
+        return sorted(self._peaks(HEAD, least), key=lambda seen: -seen.odds)
+
+    def hands(self, kind: int, least: float) -> list[Seen]:
+        """Right or left hands of so high log odds, best first."""
+        return sorted(self._peaks(kind, least), key=lambda seen: -seen.odds)
+
+    def odds_near(self, kind: int, x: float, y: float, reach: float) -> float:
+        """The highest log odds within `reach` pixels of a place; -inf outside."""
+        column, row = self._cell(x, y)
+        half = max(1.0, reach / (STRIDE * self._scale))
+        rows = slice(max(0, round(row - half)), max(0, round(row + half) + 1))
+        columns = slice(max(0, round(column - half)), max(0, round(column + half) + 1))
+        part = self._maps[kind, rows, columns]
+        return float(part.max()) if part.size else -np.inf
+
+    def _cell(self, x: float, y: float) -> tuple[float, float]:
+        middle = (STRIDE - 1) / 2
+        return tuple((((at - of + 0.5) / self._scale - 0.5) - middle) / STRIDE for at, of in ((x, self._x0), (y, self._y0)))  # type: ignore[return-value]
+
+    def _peaks(self, kind: int, least: float) -> list[Seen]:
+        odds = self._maps[kind]
+        top = (odds >= cv2.dilate(odds, np.ones((3, 3), np.uint8))) & (odds >= least)
+        return [self._peak(kind, int(row), int(column)) for row, column in zip(*np.nonzero(top), strict=True)]
+
+    def _peak(self, kind: int, row: int, column: int) -> Seen:
+        odds = self._maps[kind]
+        dx, dy = _summit(odds[row], column), _summit(odds[:, column], row)
+        middle = (STRIDE - 1) / 2
+        x, y = (((at * STRIDE + middle + 0.5) * self._scale - 0.5) for at in (column + dx, row + dy))
+        width = 0.0
+        if kind == HEAD:
+            breadth = USUAL_PX * float(np.exp(np.clip(self._maps[BREADTH, row, column], -1.5, 1.5)))
+            width = breadth * self._scale * WIDTH_PER_BREADTH
+        return Seen(self._x0 + x, self._y0 + y, float(odds[row, column]), width)
+
+
+class Finder:
+    """The network. Raises RuntimeError where this build of OpenCV cannot run it."""
+
+    def __init__(self) -> None:
+        weights = np.frombuffer(files("deixis_tracker").joinpath("finder.onnx").read_bytes(), np.uint8)
+        try:
+            self._network = cv2.dnn.readNetFromONNX(weights)
+        except cv2.error as error:
+            raise RuntimeError(f"finder.onnx: OpenCV {cv2.__version__} cannot read it ({error})") from None
+
+    def maps(self, picture: Image) -> Maps:
+        """Maps (4, h / STRIDE, w / STRIDE) of a picture (h, w, 3) BGR; its sides are multiples of GRAIN."""
+        blob = cv2.dnn.blobFromImage(picture, 1 / PIXEL_SPREAD, mean=(PIXEL_MIDDLE,) * 3)
+        self._network.setInput(blob)
+        return np.asarray(self._network.forward()[0], np.float32)
+
+    def around(self, picture: Image, x: float, y: float, width: float) -> Surroundings:
+        """What is around the head at (x, y) of a picture (h, w, 3) BGR; `width`: of the head, pixels."""
+        scale = width / (USUAL_PX * WIDTH_PER_BREADTH)
+        left, top, right, bottom = x - WIDE * width, y - ABOVE * width, x + WIDE * width, y + BELOW * width
+        x0, y0 = max(0, int(left)), max(0, int(top))
+        part = picture[y0 : max(y0 + 1, min(picture.shape[0], round(bottom))), x0 : max(x0 + 1, round(right))]
+        return self._looked_at(part, x0, y0, scale)
+
+    def over(self, picture: Image, scale: float) -> Surroundings:
+        """What is in a whole picture, `scale` of whose pixels are made one."""
+        return self._looked_at(picture, 0, 0, scale)
+
+    def _looked_at(self, part: Image, x0: int, y0: int, scale: float) -> Surroundings:
+        size = max(1, round(part.shape[1] / scale)), max(1, round(part.shape[0] / scale))
+        small = cv2.resize(part, size, interpolation=cv2.INTER_AREA if scale > 1 else cv2.INTER_LINEAR)
+        right, below = -size[0] % GRAIN, -size[1] % GRAIN
+        padded = cv2.copyMakeBorder(small, 0, below, 0, right, cv2.BORDER_REPLICATE)
+        maps = self.maps(np.asarray(padded, np.uint8))
+        return Surroundings(maps[:, : -(-size[1] // STRIDE), : -(-size[0] // STRIDE)], x0, y0, scale)
+
+
+def search_scales(height: int, width: int) -> list[float]:
+    """Scales at which a picture of that size is searched, the finest first; two are an octave apart."""
+    scales = [max(1.0, max(height, width) / 320)]
+    while min(height, width) / (2 * scales[-1]) >= LEAST_SIDE_PX:
+        scales.append(2 * scales[-1])
+    return scales
+
+
+def apart(heads: list[Seen]) -> list[Seen]:
+    """Of heads that lie on one another the best, best first."""
+    kept: list[Seen] = []
+    for seen in sorted(heads, key=lambda head: -head.odds):
+        near = (np.hypot(seen.x - other.x, seen.y - other.y) < NEAREST * max(seen.width, other.width) for other in kept)
+        if not any(near):
+            kept.append(seen)
+    return kept
+
+
+def _summit(line: Maps, k: int) -> float:
+    """Offset of the summit of the parabola through three points around `k`."""
+    if not 0 < k < len(line) - 1:
+        return 0.0
+    left, middle, right = (float(value) for value in line[k - 1 : k + 2])
+    bend = left - 2 * middle + right
+    return 0.0 if bend >= 0 else max(-0.5, min(0.5, 0.5 * (left - right) / bend))

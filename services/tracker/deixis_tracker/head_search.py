@@ -1,0 +1,147 @@
+"""Looks for heads that nobody follows yet: the whole picture, a scale at a time, and again at places where one may be.
+
+A single look can be wrong, so the log odds of several looks are added up before a head is believed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from deixis_tracker.background import MotionHistory
+from deixis_tracker.config import TrackerConfig
+from deixis_tracker.faces import look
+from deixis_tracker.finder import Finder, apart, search_scales
+from deixis_tracker.frame import COARSE, Step, Views, around
+from deixis_tracker.persons import HandTrack, Person
+
+SEARCH_S = 0.5  # all scales, once somebody is tracked
+SCALE_S = 1 / 30  # one scale, before
+LEAST_ODDS = 0.8  # of a place that is looked at again
+DOUBTFUL = 1.0  # log odds that speak neither for a head nor against it: those of things that pass for one
+MOST_FOR, MOST_AGAINST = 1.0, 2.0  # that one look adds: looks in a row are wrong together
+LOOK_S, MOST_APART = 1 / 30, 2.0  # a look counts in full so long after the last; looks farther apart up to so much
+MOST_LOOKS, MOST_CANDIDATES, LOOKS_A_FRAME = 30, 12, 2
+MOVED = 0.08  # share of a place that moved, of a head
+ARM_WIDE = 1.5  # head widths about the line from shoulder to hand
+DISTURBED_S = 0.8  # motion says nothing so long after somebody known was there, or the light was switched
+NEAR = 0.5  # head widths: so near it is the same head
+WALKING = 9.0  # head widths a second
+
+
+@dataclass
+class Candidate:
+    """A place where a head may be, and what the looks at it have added up to (`worth`)."""
+
+    x: float
+    y: float
+    width: float
+    odds: float
+    found_ns: int
+    looks: int = 1
+    alive: bool = False  # it moved, or a face was seen from the front
+    disturbed_ns: int = -(10**18)  # when its motion said nothing last
+
+    def is_near(self, x: float, y: float, widths: float) -> bool:
+        """Whether a place is so many head widths away at most."""
+        return math.hypot(x - self.x, y - self.y) < widths * self.width
+
+
+class HeadSearch:
+    """The search of one camera's pictures, all of one size."""
+
+    def __init__(self, height: int, width: int, config: TrackerConfig, finder: Finder) -> None:
+        """For working pictures of `height` and `width`."""
+        self._config = config
+        self._finder = finder
+        self._scales = search_scales(height, width)
+        self._next = 0
+        self._begun = False
+        self.candidates: list[Candidate] = []
+
+    def search(self, views: Views, tracked: int, step: Step) -> None:
+        """Search at the scales that are due; `tracked`: number of heads known. New places become candidates."""
+        period_s = SEARCH_S / len(self._scales) if tracked else SCALE_S
+        due = min(step.periods(period_s), len(self._scales)) if self._begun else len(self._scales)
+        self._begun = True
+        for _ in range(due):
+            self._search_at(self._scales[self._next], views, step)
+            self._next = (self._next + 1) % len(self._scales)
+
+    def _search_at(self, scale: float, views: Views, step: Step) -> None:
+        largest = self._config.max_head_share * views.full.shape[0]
+        for seen in apart(self._finder.over(views.full, scale).heads(LEAST_ODDS)):
+            new = not any(known.is_near(seen.x, seen.y, NEAR) for known in self.candidates)
+            if new and self._config.min_head_px <= seen.width <= largest:
+                self.candidates.append(Candidate(seen.x, seen.y, seen.width, worth(seen.odds), step.now_ns))
+
+    def confirmed(self, views: Views, motion: MotionHistory, step: Step) -> list[Candidate]:
+        """Look at the candidates again, but those found in this picture; those believed are returned and leave the list."""
+        earlier = [candidate for candidate in self.candidates if candidate.found_ns < step.now_ns]
+        for candidate in sorted(earlier, key=lambda c: c.looks)[:LOOKS_A_FRAME]:
+            self._look(candidate, views, step)
+            candidate.alive = candidate.alive or self._moves(candidate, motion, step) or _is_face(candidate, views)
+        believed = [c for c in self.candidates if c.alive and c.odds >= self._config.confirm_odds]
+        kept = [c for c in self.candidates if c not in believed and c.odds > -MOST_FOR and c.looks < MOST_LOOKS]
+        self.candidates = sorted(kept, key=lambda c: -c.odds)[:MOST_CANDIDATES]
+        return believed
+
+    def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
+        """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""
+        for candidate in self.candidates:
+            if unstable or any(_is_about(person, candidate) for person in persons):
+                candidate.disturbed_ns = step.now_ns
+
+    @staticmethod
+    def _moves(candidate: Candidate, motion: MotionHistory, step: Step) -> bool:
+        """Whether something moved there lately by itself: pictures, vases and busts do not."""
+        if step.now_ns - candidate.disturbed_ns < DISTURBED_S * 1e9:
+            return False
+        half = 0.7 * candidate.width
+        box = around(candidate.x, candidate.y, half, half, half, half)
+        rows, columns = box.scaled(COARSE * 0.5).window(*motion.history.shape)
+        part = motion.history[rows, columns]
+        return bool(np.count_nonzero(part) >= MOVED * part.size > 0)
+
+    def _look(self, candidate: Candidate, views: Views, step: Step) -> None:
+        around = self._finder.around(views.full, candidate.x, candidate.y, candidate.width)
+        reach = NEAR + WALKING * step.passed_s
+        heads = [seen for seen in around.heads(DOUBTFUL - MOST_AGAINST) if candidate.is_near(seen.x, seen.y, reach)]
+        candidate.looks += 1
+        # Looks that follow each other quickly see nearly the same.
+        share = min(step.passed_s / LOOK_S, MOST_APART)
+        if not heads:
+            candidate.odds -= share * MOST_AGAINST
+            return
+        best = heads[0]
+        candidate.odds += share * worth(best.odds)
+        candidate.x, candidate.y = best.x, best.y
+        candidate.width += 0.5 * (best.width - candidate.width)
+
+
+def _is_about(person: Person, candidate: Candidate) -> bool:
+    """Whether a place lies on the body of a person, or at an arm."""
+    body = person.body_box()
+    if body.x < candidate.x < body.x + body.w and body.y < candidate.y < body.y + body.h:
+        return True
+    return any(_from_arm(person, hand, candidate) < ARM_WIDE * person.width for hand in person.hands)
+
+
+def _from_arm(person: Person, hand: HandTrack, candidate: Candidate) -> float:
+    """Distance from the line between shoulder and hand, pixels."""
+    start = np.array(person.shoulder(hand.motion.x))
+    way = np.array([hand.motion.x, hand.motion.y]) - start
+    at = np.array([candidate.x, candidate.y])
+    share = float(np.clip((at - start) @ way / max(1e-6, float(way @ way)), 0, 1))
+    return float(np.hypot(*(start + share * way - at)))
+
+
+def _is_face(candidate: Candidate, views: Views) -> bool:
+    return look(views.grey, candidate.x, candidate.y, candidate.width) is not None
+
+
+def worth(odds: float) -> float:
+    """What one look says for a head, or against it."""
+    return max(-MOST_AGAINST, min(odds - DOUBTFUL, MOST_FOR))
