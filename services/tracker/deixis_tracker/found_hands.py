@@ -19,6 +19,7 @@ from deixis_tracker.segmentation import Blob
 
 LEAST_ODDS = 1.0
 REACH, MIDDLE, USUAL = 0.62, 0.14, 0.3  # head widths: farthest part of a hand, what is surely hand, a hand taken for a disk
+BESIDE = 1.6  # head widths from the head; nearer, shoulders of arms that move pass for hands
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
 ALIKE = 2.5  # deviations of the colour of what is surely hand
 LEAST_SPREAD = 9.0  # grey levels
@@ -50,7 +51,8 @@ def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
     seen = []
     for person in persons:
         for kind in (RIGHT_HAND, LEFT_HAND):
-            near = [Place(person, hand) for hand in _hands(person, kind) if person.distance(hand.x, hand.y) < config.reach]
+            hands = (Place(person, hand) for hand in _hands(person, kind))
+            near = [place for place in hands if BESIDE < person.distance(place.hand.x, place.hand.y) < config.reach]
             seen += near[:1]
     kept: list[Place] = []
     for place in sorted(seen, key=lambda place: -place.hand.odds):

@@ -15,7 +15,7 @@ from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import look
 from deixis_tracker.finder import Finder, apart, search_scales
 from deixis_tracker.frame import COARSE, Step, Views, around
-from deixis_tracker.persons import HandTrack, Person
+from deixis_tracker.persons import Person
 
 SEARCH_S = 0.5  # all scales, once somebody is tracked
 SCALE_S = 1 / 30  # one scale, before
@@ -25,7 +25,7 @@ MOST_FOR, MOST_AGAINST = 1.0, 2.0  # that one look adds: looks in a row are wron
 LOOK_S, MOST_APART = 1 / 30, 2.0  # a look counts in full so long after the last; looks farther apart up to so much
 MOST_LOOKS, MOST_CANDIDATES, LOOKS_A_FRAME = 30, 12, 2
 MOVED = 0.08  # share of a place that moved, of a head
-ARM_WIDE = 1.5  # head widths about the line from shoulder to hand
+ABOUT = 6.5  # head widths around somebody known: arms reach so far, and what they pass before seems to move
 DISTURBED_S = 0.8  # motion says nothing so long after somebody known was there, or the light was switched
 NEAR = 0.5  # head widths: so near it is the same head
 WALKING = 9.0  # head widths a second
@@ -91,7 +91,7 @@ class HeadSearch:
     def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
         """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""
         for candidate in self.candidates:
-            if unstable or any(_is_about(person, candidate) for person in persons):
+            if unstable or any(person.distance(candidate.x, candidate.y) < ABOUT for person in persons):
                 candidate.disturbed_ns = step.now_ns
 
     @staticmethod
@@ -119,23 +119,6 @@ class HeadSearch:
         candidate.odds += share * worth(best.odds)
         candidate.x, candidate.y = best.x, best.y
         candidate.width += 0.5 * (best.width - candidate.width)
-
-
-def _is_about(person: Person, candidate: Candidate) -> bool:
-    """Whether a place lies on the body of a person, or at an arm."""
-    body = person.body_box()
-    if body.x < candidate.x < body.x + body.w and body.y < candidate.y < body.y + body.h:
-        return True
-    return any(_from_arm(person, hand, candidate) < ARM_WIDE * person.width for hand in person.hands)
-
-
-def _from_arm(person: Person, hand: HandTrack, candidate: Candidate) -> float:
-    """Distance from the line between shoulder and hand, pixels."""
-    start = np.array(person.shoulder(hand.motion.x))
-    way = np.array([hand.motion.x, hand.motion.y]) - start
-    at = np.array([candidate.x, candidate.y])
-    share = float(np.clip((at - start) @ way / max(1e-6, float(way @ way)), 0, 1))
-    return float(np.hypot(*(start + share * way - at)))
 
 
 def _is_face(candidate: Candidate, views: Views) -> bool:

@@ -70,7 +70,7 @@ class HeadTracks:
         self._drop_doubles(skin)
         for person in self.persons:
             person.skin_centre = self._centre_of_skin(person, views.skin)
-        self._find_heads(views, room, motion, step)
+        self._find_heads(views, room, motion, skin, step)
         self._measure_faces(views, step)
 
     # --- those known --------------------------------------------------------------------------------------------------
@@ -104,7 +104,9 @@ class HeadTracks:
             place = scale * person.x, scale * person.y, scale * person.width
             person.colours.learn(picture, *place, repeated(0.03, lessons))
 
-        if seen is not None and not covered and step.periods(LEARN_SKIN_S) and _skin_share(person, views.skin) >= LEAST_SKIN:
+        # Whoever never showed the face has skin, too; of others it is learned better from the front.
+        faceless = seen is not None and not covered and not person.sightings
+        if step.periods(LEARN_SKIN_S) and faceless and _skin_share(person, views.skin) >= LEAST_SKIN:
             _learn_skin(person, views.full, skin)
 
     def _seen_as_shape(self, person: Person) -> Seen | None:
@@ -194,14 +196,14 @@ class HeadTracks:
 
     # --- new ones -----------------------------------------------------------------------------------------------------
 
-    def _find_heads(self, views: Views, room: Background, motion: MotionHistory, step: Step) -> None:
+    def _find_heads(self, views: Views, room: Background, motion: MotionHistory, skin: SkinModel, step: Step) -> None:
         self._search.search(views, len(self.persons), step)
         self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, c.width)]
         self._search.disturb(self.persons, room.unstable, step)
         for head in self._search.confirmed(views, motion, step):
-            self._add(head.x, head.y, head.width, views, room, step)
+            self._add(head.x, head.y, head.width, views, room, skin, step)
 
-    def _add(self, x: float, y: float, width: float, views: Views, room: Background, step: Step) -> None:
+    def _add(self, x: float, y: float, width: float, views: Views, room: Background, skin: SkinModel, step: Step) -> None:
         """A new person whose head was found with its centre at (x, y), unless it is not new, or one too many."""
         if self._is_known(x, y, width):
             return
@@ -214,6 +216,9 @@ class HeadTracks:
         person.around = self._shapes.around(views.full, x, y, width)
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
         self.persons.append(person)
+        if _look(person, views) is not None:
+            person.sightings, person.face_ns = 1, now_ns
+            _learn_skin(person, views.full, skin)
         rows, columns = person.head_box().scaled(COARSE).window(*views.changed.shape)
         if views.changed[rows, columns].mean() < 0.5 * 255:  # was here when the room was learned
             room.mark_unknown(person.resting_hands_box().scaled(COARSE))
