@@ -23,6 +23,7 @@ LEAST_ODDS = 0.8  # of a place that is looked at again
 DOUBTFUL = 1.0  # log odds that speak neither for a head nor against it: those of things that pass for one
 MOST_FOR, MOST_AGAINST = 1.0, 2.0  # that one look adds: looks in a row are wrong together
 LOOK_S, MOST_APART = 1 / 30, 2.0  # a look counts in full so long after the last; looks farther apart up to so much
+LOOK_AGAIN_S = 0.1  # once somebody is tracked: vases that look like heads cost a third of the tracker's time
 MOST_LOOKS, MOST_CANDIDATES, LOOKS_A_FRAME = 30, 12, 2
 MOVED = 0.08  # share of a place that moved, of a head
 ABOUT = 6.5  # head widths around somebody known: arms reach so far, and what they pass before seems to move
@@ -39,7 +40,7 @@ class Candidate:
     y: float
     width: float
     odds: float
-    found_ns: int
+    seen_ns: int
     looks: int = 1
     alive: bool = False  # it moved, or a face was seen from the front
     disturbed_ns: int = -(10**18)  # when its motion said nothing last
@@ -77,9 +78,11 @@ class HeadSearch:
             if new and self._config.min_head_px <= seen.width <= largest:
                 self.candidates.append(Candidate(seen.x, seen.y, seen.width, worth(seen.odds), step.now_ns))
 
-    def confirmed(self, views: Views, motion: MotionHistory, step: Step) -> list[Candidate]:
+    def confirmed(self, views: Views, motion: MotionHistory, tracked: int, step: Step) -> list[Candidate]:
         """Look at the candidates again, but those found in this picture; those believed are returned and leave the list."""
-        earlier = [candidate for candidate in self.candidates if candidate.found_ns < step.now_ns]
+        if tracked and not step.periods(LOOK_AGAIN_S):
+            return []
+        earlier = [candidate for candidate in self.candidates if candidate.seen_ns < step.now_ns]
         for candidate in sorted(earlier, key=lambda c: c.looks)[:LOOKS_A_FRAME]:
             self._look(candidate, views, step)
             candidate.alive = candidate.alive or self._moves(candidate, motion, step) or _is_face(candidate, views)
@@ -107,11 +110,13 @@ class HeadSearch:
 
     def _look(self, candidate: Candidate, views: Views, step: Step) -> None:
         around = self._finder.around(views.full, candidate.x, candidate.y, candidate.width)
-        reach = NEAR + WALKING * step.passed_s
+        since_s = (step.now_ns - candidate.seen_ns) / 1e9
+        candidate.seen_ns = step.now_ns
+        reach = NEAR + WALKING * min(since_s, MOST_APART * LOOK_AGAIN_S)
         heads = [seen for seen in around.heads(DOUBTFUL - MOST_AGAINST) if candidate.is_near(seen.x, seen.y, reach)]
         candidate.looks += 1
         # Looks that follow each other quickly see nearly the same.
-        share = min(step.passed_s / LOOK_S, MOST_APART)
+        share = min(since_s / LOOK_S, MOST_APART)
         if not heads:
             candidate.odds -= share * MOST_AGAINST
             return

@@ -200,7 +200,7 @@ class HeadTracks:
         self._search.search(views, len(self.persons), step)
         self._search.candidates = [c for c in self._search.candidates if not self._is_known(c.x, c.y, c.width)]
         self._search.disturb(self.persons, room.unstable, step)
-        for head in self._search.confirmed(views, motion, step):
+        for head in self._search.confirmed(views, motion, len(self.persons), step):
             self._add(head.x, head.y, head.width, views, room, skin, step)
 
     def _add(self, x: float, y: float, width: float, views: Views, room: Background, skin: SkinModel, step: Step) -> None:
