@@ -108,3 +108,8 @@ def test_the_mirror_changes_nothing_but_the_side(finder, pointing):
 def test_a_wall_has_no_head(finder):
     wall = np.full((240, 320, 3), (120, 150, 190), np.uint8)
     assert finder.over(wall, 1.0).heads(0.0) == []
+
+
+@pytest.mark.parametrize("place", [(5000, 100), (100, 5000), (-5000, 100), (100, -5000)])
+def test_around_a_head_predicted_far_outside_there_is_nothing_to_fail_on(finder, place):
+    assert finder.around(np.full((240, 320, 3), 90, np.uint8), *place, 40.0).heads(0.5) == []

@@ -108,7 +108,8 @@ class Finder:
         """What is around the head at (x, y) of a picture (h, w, 3) BGR; `width`: of the head, pixels."""
         scale = width / (USUAL_PX * WIDTH_PER_BREADTH)
         left, top, right, bottom = x - WIDE * width, y - ABOVE * width, x + WIDE * width, y + BELOW * width
-        x0, y0 = max(0, int(left)), max(0, int(top))
+        # A head may be predicted far outside; a part without a pixel would end the stage.
+        x0, y0 = min(max(0, int(left)), picture.shape[1] - 1), min(max(0, int(top)), picture.shape[0] - 1)
         part = picture[y0 : max(y0 + 1, min(picture.shape[0], round(bottom))), x0 : max(x0 + 1, round(right))]
         return self._looked_at(part, x0, y0, scale)
 

@@ -43,7 +43,7 @@ class Place(NamedTuple):
 def found_hands(views: Views, persons: list[Person], blobs: list[Blob], config: TrackerConfig) -> list[Blob]:
     """Blobs of the hands of these persons that none of `blobs` covers."""
     places = [place for place in hand_places(persons, config) if not any(_covers(blob, place) for blob in blobs)]
-    return [_blob(views, place, config) for place in places]
+    return [blob for place in places if (blob := _blob(views, place, config)).area]
 
 
 def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
