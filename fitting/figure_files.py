@@ -18,6 +18,8 @@ Floats = NDArray[np.floating[Any]]
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "deixis" / "figures"
 PART = 500
 """Figures of one file, made by one process."""
+ROOMS = 25
+"""Empty rooms of one file: what stands in them must not be taken for heads and hands."""
 MOST_PEOPLE = 2
 HEAD, BREADTH, HEAD_PX, SEEN, HANDS, AREAS = slice(0, 2), 2, 3, 4, slice(5, 9), slice(9, 11)
 """Columns of what is known of a person; hands: x and y of the right one, then of the left one."""
@@ -25,22 +27,25 @@ HEAD, BREADTH, HEAD_PX, SEEN, HANDS, AREAS = slice(0, 2), 2, 3, 4, slice(5, 9), 
 
 @dataclass(frozen=True)
 class Figures:
-    """Many. pictures: (n, h, w, 3) BGR; people: (n, MOST_PEOPLE, 11), of columns as above, not a number where there is none."""
+    """Many. pictures: (n, h, w, 3) BGR; people: (n, MOST_PEOPLE, 11), of columns as above, not a number where there is none;
+    rooms: (m, h, w, 3) without people.
+    """
 
     pictures: NDArray[np.uint8]
     people: Floats
+    rooms: NDArray[np.uint8]
 
     def __len__(self) -> int:
         return len(self.pictures)
 
     @classmethod
-    def of(cls, figures: Sequence[Figure]) -> Figures:
+    def of(cls, figures: Sequence[Figure], rooms: Sequence[NDArray[np.uint8]]) -> Figures:
         """From the simulator's."""
         people = np.full((len(figures), MOST_PEOPLE, 11), np.nan, np.float32)
         for row, figure in enumerate(figures):
             for number, truth in enumerate(figure.people):
                 people[row, number] = _columns(truth)
-        return cls(np.array([figure.picture for figure in figures]), people)
+        return cls(np.array([figure.picture for figure in figures]), people, np.array(rooms))
 
     def save(self, path: Path) -> None:
         """Write a file, whole or not at all."""
@@ -53,7 +58,7 @@ class Figures:
     def load(cls, paths: Sequence[Path]) -> Figures:
         """All figures of some files."""
         files = [np.load(path) for path in paths]
-        return cls(*(np.concatenate([file[name] for file in files]) for name in ("pictures", "people")))
+        return cls(*(np.concatenate([file[name] for file in files]) for name in ("pictures", "people", "rooms")))
 
 
 def _columns(truth: Truth) -> Floats:
@@ -77,7 +82,9 @@ def _render(job: tuple[Path, int, int]) -> Path:
     os.environ["LP_NUM_THREADS"] = "0"  # Mesa's: one process a core is quicker than all cores on one picture
     from deixis_simulation.draw import avatars_of  # noqa: PLC0415 (after Mesa was told)
     from deixis_simulation.figures import figures  # noqa: PLC0415
+    from deixis_simulation.studio import room_pictures  # noqa: PLC0415
 
     path, seed, count = job
-    Figures.of(list(figures(seed, avatars_of(seed), count))).save(path)
+    rooms = room_pictures(np.random.default_rng((seed, 1)), ROOMS)
+    Figures.of(list(figures(seed, avatars_of(seed), count)), rooms).save(path)
     return path

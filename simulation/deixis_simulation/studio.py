@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from .avatars import Picture
 from .dice import Dice
 from .draw import HELD_OUT_FROM_SEED, draw_scene
 from .draw_lens import Overrides, draw_sensor
@@ -44,6 +45,17 @@ def behind(rng: np.random.Generator, rooms: Sequence[FloatPicture], side_px: int
     top, left = (int(rng.integers(0, size - side + 1)) for size in room.shape[:2])
     part = room[top : top + side, left : left + side] * np.float32(rng.uniform(0.3, 1.5))
     return np.asarray(cv2.resize(part, (side_px, side_px), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def room_pictures(rng: np.random.Generator, count: int) -> list[Picture]:
+    """So many rooms without people, as cameras take them (h, w, 3) BGR. Raises RenderError."""
+    pictures = []
+    for scene in draw_rooms(rng, count):
+        camera = SensorModel(scene.model_copy(update={"sensor": draw_sensor(Dice(rng))}))
+        light = empty_room(scene)
+        camera.meter(light)
+        pictures.append(camera.expose(light, 0, float(rng.uniform(0.6, 1.5))))
+    return pictures
 
 
 def draw_camera(scene: Scene, dice: Dice, side_px: int) -> SensorModel:

@@ -138,11 +138,11 @@ def test_health_is_answered_and_advances_while_the_loop_runs(node, peer, robot, 
 
 
 @pytest.mark.usefixtures("node")
-def test_get_answers_json_when_asked_and_refuses_other_formats(peer, robot, looping):
+def test_get_answers_json_when_asked_and_refuses_other_formats(peer, robot, looping, wait_for):
     looping()
-    reply = next(iter(peer.get(f"deixis/{robot}/*/health?format=json", timeout=5.0)))
+    (reply,) = answers(peer, f"deixis/{robot}/*/health?format=json", wait_for)
     assert json.loads(reply.ok.payload.to_bytes())["stage"] == "tracker"
-    reply = next(iter(peer.get(f"deixis/{robot}/*/health?format=xml", timeout=5.0)))
+    (reply,) = answers(peer, f"deixis/{robot}/*/health?format=xml", wait_for)
     assert b"format: 'xml'" in reply.err.payload.to_bytes()
 
 
@@ -290,11 +290,16 @@ def track():
     return Track.model_validate(content | {"bbox_px": (0, 0, 1, 1)})
 
 
-def test_a_reply_that_is_too_large_is_an_error_that_says_how_to_ask(node, peer, robot, looping):
+def answers(peer, selector, wait_for):
+    """Replies to a get, once there are any: a get before the queryable is known to the peer ends at once, without a reply."""
+    return wait_for(lambda: list(peer.get(selector, timeout=5.0)), f"an answer to {selector}")
+
+
+def test_a_reply_that_is_too_large_is_an_error_that_says_how_to_ask(node, peer, robot, looping, wait_for):
     small = dataclasses.replace(topics.STATE, max_bytes=10)
     node.serve_get(small, lambda _: [(topics.STATE.key(robot), FRAME)])
     looping()
-    (reply,) = peer.get(topics.STATE.key(robot), timeout=5.0)
+    (reply,) = answers(peer, topics.STATE.key(robot), wait_for)
     assert reply.ok is None
     assert "more than the 10 that 'fusion/state' allows; ask for less, with ?top=N or ?poi=ID" in reply.err.payload.to_string()
 
