@@ -96,7 +96,7 @@ def _tiled(figures: Figures, rng: np.random.Generator) -> tuple[NDArray[np.uint8
 def _room_tile(figures: Figures, rng: np.random.Generator) -> NDArray[np.uint8]:
     room = figures.rooms[int(rng.integers(len(figures.rooms)))]
     left = int(rng.integers(0, room.shape[1] - room.shape[0] + 1))
-    return room[:, left : left + room.shape[0]]
+    return np.asarray(room[:, left : left + room.shape[0]], np.uint8)
 
 
 def _placed(person: Floats, rng: np.random.Generator) -> tuple[float, Floats]:
@@ -130,7 +130,9 @@ def _paste(pixels: NDArray[np.uint8], picture: NDArray[np.uint8], at: Floats, si
     x0, y0 = at - (left, top)
     warp = np.array([[scale, 0, x0 + 0.5 * scale - 0.5], [0, scale, y0 + 0.5 * scale - 0.5]])
     size = right - left, bottom - top
-    pixels[top:bottom, left:right] = cv2.warpAffine(picture, warp, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    pixels[top:bottom, left:right] = cv2.warpAffine(
+        picture, warp, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
 
 
 class _Maps:

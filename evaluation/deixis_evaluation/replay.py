@@ -114,7 +114,8 @@ def replay_tracker(given: Given) -> Sequence[Message]:
     meta, made = given.clip.truth.meta, []
     for frame, picture in given.pictures():
         tracks = tracker.update(picture, frame.run, frame.stamp_ns)
-        made.append(Tracks.derive(frame, producer, width=meta.width, height=meta.height, tracks=tracks))
+        said = {"width": meta.width, "height": meta.height, "room_offset_px": tracker.room_offset_px}
+        made.append(Tracks.derive(frame, producer, tracks=tracks, **said))
     return made
 
 
@@ -133,7 +134,8 @@ def replay_gesture(given: Given) -> Sequence[Message]:
     producer, recognizer = Producer("gesture", INSTANCE), GestureRecognizer(GestureConfig())
     lens, made = Lens.of(given.camera()), []
     for seen in given.of(Tracks):
-        gestures = recognizer.update(seen.tracks, seen.width, seen.height, lens, seen.run, seen.stamp_ns)
+        size, offset = (seen.width, seen.height), seen.room_offset_px
+        gestures = recognizer.update(seen.tracks, *size, lens, seen.run, seen.stamp_ns, offset)
         made.append(Gestures.derive(seen, producer, gestures=gestures))
     return made
 

@@ -37,6 +37,7 @@ Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Share = Annotated[float, Field(ge=-1e-9, le=1 + 1e-9)]
 Pixel = Annotated[float, Field(ge=-4 * MAX_SIDE_PX, le=4 * MAX_SIDE_PX)]
+FarPixel = Annotated[float, Field(ge=-1e9, le=1e9)]  # summed up: a robot that turns on the spot for a day comes to 1e8
 Extent = Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]
 Metre = Annotated[float, Field(ge=-1e5, le=1e5)]
 Degree = Annotated[float, Field(ge=-360, le=360)]
@@ -228,6 +229,11 @@ class Tracks(OfFrame):
     width: int = Field(ge=1, le=MAX_SIDE_PX, description="Width of the frame the pixels refer to.")
     height: int = Field(ge=1, le=MAX_SIDE_PX)
     tracks: list[Track] = Field(default_factory=list, max_length=MAX_TRACKS)
+    room_offset_px: tuple[FarPixel, FarPixel] = Field(
+        default=(0.0, 0.0),
+        description="How far the room has moved in the middle of the picture since the run began, x right, y down: the camera "
+        "moved. Whether a hand is still is judged with the room, not with the picture.",
+    )
 
 
 # --- headpose ---------------------------------------------------------------------------------------------------------

@@ -70,6 +70,23 @@ def _played(tracks_at, rate_hz=30, seconds=4.2, recognizer=None, run=1, stamp_ns
     return [(t, recognizer.update(tracks_at(t), 640, 480, LENS, run, stamp_ns(t))) for t in times]
 
 
+def _turning(tracks_at, speed_px_s):
+    """The same, seen by a camera that turns: everything moves to the right."""
+    recognizer, seen = GestureRecognizer(GestureConfig()), []
+    for time_s in (i / 30 for i in range(126)):
+        dx = speed_px_s * time_s
+        tracks = [_shifted(track, dx) for track in tracks_at(time_s)]
+        seen.append((time_s, recognizer.update(tracks, 640, 480, LENS, 1, _steady(time_s), (dx, 0.0))))
+    return seen
+
+
+def _shifted(track, dx):
+    (x, y), (left, top, w, h) = track.centroid_px, track.bbox_px
+    contour = np.frombuffer(track.contour, "<i2").reshape(-1, 2) + np.array([round(dx), 0])
+    moved = {"centroid_px": (x + dx, y), "bbox_px": (left + dx, top, w, h), "contour": contour.astype("<i2").tobytes()}
+    return track.model_copy(update=moved)
+
+
 def _pointing(time_s):
     return [_face(), _hand(_place(time_s), POINT)]
 
@@ -190,13 +207,19 @@ def test_a_persons_distance_follows_from_the_lens(focal_px):
     assert view.distance_of(Face(320.0, 150.0, focal_px * FACE_WIDTH_M / 2.0)) == pytest.approx(2.0 / FACE_WIDTH_M)
 
 
+def test_a_hand_that_is_held_still_is_still_for_a_camera_that_turns():
+    still, turning = ([g.phase for _, (g,) in seen] for seen in (_played(_pointing), _turning(_pointing, 120.0)))
+    assert still.count("stroke") > 30
+    assert sum(a != b for a, b in zip(still, turning, strict=True)) <= 4
+
+
 @pytest.mark.parametrize("rate_hz", [10, 30, 60])
 def test_a_hand_changes_its_side_as_fast_at_any_frame_rate(rate_hz):
     arm, face, changed_s = Arm(GestureConfig(), 0.0), Face(320.0, 150.0, FACE_PX), None
     for i in range(3 * rate_hz):
         time_s = i / rate_hz
         hand = _hand((2.0, 4.0), (), kind="left_hand" if time_s < 1 else "right_hand")
-        arm.update(hand, face, time_s, 1 / rate_hz, walking=False, joined=False)
+        arm.update(hand, face, (0.0, 0.0), time_s, 1 / rate_hz, walking=False, joined=False)
         changed_s = time_s if arm.side == "right" and changed_s is None else changed_s
     assert changed_s == pytest.approx(1.14, abs=0.12)
 
@@ -207,7 +230,7 @@ def test_the_bearing_is_that_of_the_last_half_second_at_any_frame_rate(rate_hz):
     for i in range(2 * rate_hz + 1):
         time_s = i / rate_hz
         place = (-3.4 if time_s < 1.6 else -3.2, 1.0)
-        arm.update(_hand(place, POINT), face, time_s, 1 / rate_hz, walking=False, joined=False)
+        arm.update(_hand(place, POINT), face, (0.0, 0.0), time_s, 1 / rate_hz, walking=False, joined=False)
     assert arm.phase == "stroke"
     assert arm.sight is not None
     assert arm.sight.offset == pytest.approx(-3.95, abs=0.1)

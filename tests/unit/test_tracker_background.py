@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from deixis_tracker.background import Background, MotionHistory
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.frame import Box, Step
 
 
@@ -85,6 +86,6 @@ def test_motion_is_remembered_for_half_a_second_at_any_frame_rate(room, rate_hz)
     moved[40:60, 60:90] = (20, 250, 20)
     remembered = 0
     for step in frames(1, rate_hz):
-        motion.update(moved, step)
+        motion.update(moved, Shift.none(), step)
         remembered += bool(motion.history.any())
     assert remembered / rate_hz == pytest.approx(0.53, abs=0.1)

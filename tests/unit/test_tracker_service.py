@@ -27,7 +27,7 @@ class OneFrameNode:
             encoding="bgr8",
             data=image.tobytes(),
         )
-        self.counted, self.answers, self._turns = {}, [], 1
+        self.counted, self.notes, self.answers, self._turns = {}, {}, [], 1
 
     def subscribe(self, _topic):
         return SimpleNamespace(take=lambda: self.frame)
@@ -44,6 +44,9 @@ class OneFrameNode:
 
     def count(self, name, n=1):
         self.counted[name] = n
+
+    def note(self, key, text):
+        self.notes[key] = text
 
     def warn(self, kind, text):
         pass
@@ -63,6 +66,19 @@ def test_a_fault_of_the_core_is_not_taken_for_one_of_the_frame(monkeypatch):
     monkeypatch.setattr(Tracker, "update", faulty)
     with pytest.raises(ValueError, match="argmax"):
         service.serve(OneFrameNode(64, 64), TrackerConfig())
+
+
+def test_a_camera_that_moves_is_noted_in_health_and_how_far_is_said_with_the_tracks(monkeypatch):
+    def turned(tracker, *_):
+        tracker.camera_moves, tracker.room_offset_px = True, (-12.0, 3.0)
+        return []
+
+    monkeypatch.setattr(Tracker, "update", turned)
+    monkeypatch.setattr(Tracker, "left_out", 0)
+    node = OneFrameNode(64, 64)
+    service.serve(node, TrackerConfig())
+    assert "camera moves" in node.notes["camera"]
+    assert node.answers[0].room_offset_px == (-12.0, 3.0)
 
 
 def test_persons_left_out_are_counted_in_health(monkeypatch):

@@ -15,6 +15,8 @@ from .hand import CHEST, Face, HandShape, hand_of, unpack_contour
 from .phases import PhaseTracker
 from .rules import StrokeGesture, Vote, vote
 
+Point = tuple[float, float]
+
 # Time over which it is averaged which side's hand it is.
 SIDE_TIME_S = 0.205
 # Offset and finger length are the medians of so much of a stroke.
@@ -83,16 +85,20 @@ class Arm:
         """How far a track is from where this hand was seen last, pixels."""
         return math.dist(self._place_px, track.centroid_px)
 
-    def update(self, track: Track, face: Face, time_s: float, frame_s: float, *, walking: bool, joined: bool) -> None:
-        """Advance by an observed hand; `frame_s`: time since the frame before; `joined`: the other is held up beside it."""
+    def update(
+        self, track: Track, face: Face, room: Point, time_s: float, frame_s: float, *, walking: bool, joined: bool
+    ) -> None:
+        """Advance by an observed hand; `room`: how far the room has moved in the picture, face widths; `frame_s`: time since
+        the frame before; `joined`: the other is held up beside it.
+        """
         self.track_id, self.seen_s, self._place_px = track.track_id, time_s, track.centroid_px
         self._first_s = time_s if self._first_s is None else self._first_s
         self._weigh_side(track, frame_s)
         hand = self._shape(track, face)
         place = hand.centroid if hand else _about(face, track.centroid_px)
         self.stretch = math.dist(place, CHEST)
-        in_image = (place[0] + face.x_px / face.width_px, place[1] + face.y_px / face.width_px)
-        phase = self._phases.update(time_s, in_image, place, walking)
+        in_room = (place[0] + face.x_px / face.width_px - room[0], place[1] + face.y_px / face.width_px - room[1])
+        phase = self._phases.update(time_s, in_room, place, walking)
         self.fingers = find_fingers(hand) if hand and phase != "idle" else []
         if phase != "stroke":
             self._stroke = StrokeGesture(self._config.settle_s)

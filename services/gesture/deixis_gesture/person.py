@@ -26,10 +26,13 @@ POINTING = ("point_left", "point_right", "invisible")
 
 
 class View(NamedTuple):
-    """What a frame was taken through: the lens, and the frame's size (width, height), pixels."""
+    """What a frame was taken through: the lens, the frame's size (width, height), and how far the room moved in the picture
+    since the frame before, pixels.
+    """
 
     lens: Lens
     size: tuple[int, int]
+    room_went_px: tuple[float, float] = (0.0, 0.0)
 
     def distance_of(self, face: Face) -> float:
         """How far away a face of this width is, face widths."""
@@ -45,6 +48,7 @@ class Person:
         self._face: Face | None = None
         self._face_speed = 0.0
         self._face_s = -math.inf
+        self._room = (0.0, 0.0)  # how far the room has moved in the picture, face widths
         self._resting_until_s = math.inf
         self._arms: list[Arm] = []
         self._current: Arm | None = None
@@ -57,19 +61,22 @@ class Person:
         """Gesture of the person as seen at `time_s`, `frame_s` after the frame before; None without a usable face."""
         if math.isinf(self._resting_until_s):
             self._resting_until_s = time_s + FIRST_LOOK_S
-        self._follow_face(tracks, time_s)
+        self._follow_face(tracks, view.room_went_px, time_s)
         if self._face is None:
             return None
+        # Summed in face widths, step by step: the width breathes, and would shake a long way that is divided by it.
+        (x, y), (dx, dy) = self._room, view.room_went_px
+        self._room = x + dx / self._face.width_px, y + dy / self._face.width_px
         walking = self._face_speed > self._config.walking_speed
         hands = [track for track in tracks if track.kind != "face" and track.observed and track.contour]
         for arm, track in self._assigned(hands, SAME_HAND * self._face.width_px):
             joined = _is_joined(track, hands, self._face, self._config)
-            arm.update(track, self._face, time_s, frame_s, walking=walking, joined=joined)
+            arm.update(track, self._face, self._room, time_s, frame_s, walking=walking, joined=joined)
         self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
         self._current = self._gesturing()
         return self._spoken(self._current, self._face, view)
 
-    def _follow_face(self, tracks: Sequence[Track], time_s: float) -> None:
+    def _follow_face(self, tracks: Sequence[Track], room_went_px: tuple[float, float], time_s: float) -> None:
         seen = [t for t in tracks if t.kind == "face" and t.bbox_px[2] >= LEAST_FACE_PX]
         if not seen:
             return
@@ -80,6 +87,7 @@ class Person:
         if old is None or passed <= 0 or passed > self._config.forget_s:
             self._face = now
             return
+        old = Face(old.x_px + room_went_px[0], old.y_px + room_went_px[1], old.width_px)
         place, scale = 1 - math.exp(-passed / PLACE_TIME_S), 1 - math.exp(-passed / WIDTH_TIME_S)
         self._face = Face(
             old.x_px + place * (now.x_px - old.x_px),

@@ -67,7 +67,7 @@ class PhaseTracker:
         self._last_s = 0.0
 
     def update(self, time_s: float, point: tuple[float, float], place: tuple[float, float], walking: bool) -> Phase:
-        """Advance to `time_s`: hand at `point` (face widths, fixed to the image), at `place` about the face's centre."""
+        """Advance to `time_s`: hand at `point` (face widths, fixed to the room), at `place` about the face's centre."""
         self._motion.add(time_s, point)
         velocity = self._motion.velocity
         if velocity is not None:

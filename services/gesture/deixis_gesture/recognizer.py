@@ -19,18 +19,33 @@ class GestureRecognizer:
         self._config = config
         self._persons: dict[int, Person] = {}
         self._clock = RunClock()
+        self._room_offset_px = (0.0, 0.0)
 
-    def update(self, tracks: Sequence[Track], width: int, height: int, lens: Lens, run: int, stamp_ns: int) -> list[Gesture]:
+    def update(
+        self,
+        tracks: Sequence[Track],
+        width: int,
+        height: int,
+        lens: Lens,
+        run: int,
+        stamp_ns: int,
+        room_offset_px: tuple[float, float] = (0.0, 0.0),
+    ) -> list[Gesture]:
         """Gestures of the frame of size `width` x `height`, taken through `lens` at `stamp_ns`, in the order of `person_id`.
 
-        Another `run` of the camera starts anew. Raises ValueError for an empty frame.
+        `room_offset_px`: how far the room has moved in the picture since the run began, for the camera moves. Another `run`
+        of the camera starts anew. Raises ValueError for an empty frame.
         """
         if width <= 0 or height <= 0:
             raise ValueError(f"width, height: {width} x {height}, must be positive")
         moment = self._clock.advance(run, stamp_ns)
         if moment.new_run:
             self._persons.clear()
-        time_s, view = moment.now_ns * 1e-9, View(lens, (width, height))
+        went_px = tuple(now - before for now, before in zip(room_offset_px, self._room_offset_px, strict=True))
+        self._room_offset_px = room_offset_px
+        if moment.new_run:
+            went_px = (0.0, 0.0)
+        time_s, view = moment.now_ns * 1e-9, View(lens, (width, height), (went_px[0], went_px[1]))
         of_person: dict[int, list[Track]] = {}
         for track in tracks:
             if track.person_id is not None:

@@ -26,7 +26,8 @@ def serve(node: Node, config: GestureConfig) -> None:
             continue
         with node.step():
             through = lens.of_frame(seen.width, seen.height)
-            gestures = recognizer.update(seen.tracks, seen.width, seen.height, through, seen.run, seen.stamp_ns)
+            size, offset = (seen.width, seen.height), seen.room_offset_px
+            gestures = recognizer.update(seen.tracks, *size, through, seen.run, seen.stamp_ns, offset)
             out.put(Gestures.derive(seen, node.producer, gestures=gestures))
 
 

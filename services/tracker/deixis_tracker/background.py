@@ -3,15 +3,19 @@
 A running mean of the room, frozen under tracked people. A person who stands there from the first frame is part of that
 mean; such a place is marked unknown: no change there says nothing. A change of the light moves most of the picture at once:
 one gain per channel is fitted to the room first, and what the gain cannot explain is relearned quickly when it covers much
-of the picture.
+of the picture. When the camera moves, the room moves with its picture (`camera_motion.py`).
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from deixis_tracker.frame import Box, Image, Mask, Step, repeated
+from deixis_tracker.camera_motion import Matrix, Shift
+from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, repeated
 
 UPDATE_S = 0.1
 STEADY_RATE, CHANGED_RATE = 0.1, 0.02  # of learning, per update
@@ -22,7 +26,10 @@ UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, c
 SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07
 SHADOW_DARKEST = 0.35
-MOTION_THRESHOLD = 14
+MOVING_RATE = 0.1  # of learning, per frame, while the camera moves: a room that is moved again and again becomes blurred
+EDGES = np.ones((3, 3), np.uint8)  # of the room, which lie a little aside while the camera moves
+DOUBT_FADES = 13  # of 255, per update: what the camera's motion laid bare, or a person left, is known after two seconds
+MOTION_THRESHOLD, MOTION_THRESHOLD_MOVING = 14, 30
 MOTION_FADES_PER_S = 480.0  # of 255
 
 
@@ -34,15 +41,32 @@ class Background:
         self._mean = image.astype(np.float32)
         self._shown = image.copy()
         self._threshold = threshold
-        self.unknown: Mask = np.zeros(image.shape[:2], np.uint8)
+        self._doubt: Mask = np.zeros(image.shape[:2], np.uint8)
+        self._moves = False
         self.unstable = False  # the light changed just now: what differs from the room is no person
         self._settled_ns = 0
         self._expected = self._shown
 
     def mark_unknown(self, box: Box) -> None:
         """Say that a person covers `box` in the mean."""
-        rows, columns = box.window(*self.unknown.shape)
-        self.unknown[rows, columns] = 255
+        rows, columns = box.window(*self._doubt.shape)
+        self._doubt[rows, columns] = 255
+
+    @property
+    def unknown(self) -> Mask:
+        """255 where the room is not known, else 0."""
+        return np.asarray(cv2.threshold(self._doubt, 0, 255, cv2.THRESH_BINARY)[1], np.uint8)
+
+    def move(self, image: Image, shift: Shift, moves: bool) -> None:
+        """Move the room with the picture, before `changed`; `moves`: whether the camera moved just now."""
+        self._moves = moves
+        if shift.is_none:
+            return
+        matrix, size = shift.of_size(COARSE), image.shape[1::-1]
+        # What is laid bare is taken from the picture, and is no known room yet.
+        self._mean = np.asarray(_warped(self._mean, matrix, image.astype(np.float32)), np.float32)
+        self._doubt = np.asarray(cv2.warpAffine(self._doubt, matrix, size, flags=cv2.INTER_NEAREST, borderValue=255), np.uint8)
+        self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
     def changed(self, image: Image, frozen: Mask) -> Mask:
         """(H, W) uint8, 255 where the picture differs from the room under today's light. `frozen`: 255 where people are."""
@@ -50,7 +74,8 @@ class Background:
         difference = cv2.absdiff(image, self._expected)
         b, g, r = cv2.split(difference)
         largest = cv2.max(cv2.max(b, g), r)
-        return np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
+        changed = np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
+        return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, EDGES), np.uint8) if self._moves else changed
 
     @property
     def room(self) -> Image:
@@ -81,8 +106,13 @@ class Background:
             self._settled_ns = step.now_ns + round(LIGHT_SETTLES_S * 1e9)
         self.unstable = step.now_ns < self._settled_ns
         updates = step.periods(UPDATE_S)
+        if updates:
+            faded = cv2.subtract(self._doubt, np.full_like(self._doubt, min(255, DOUBT_FADES * updates)))
+            self._doubt = np.asarray(np.where(room, faded, self._doubt), np.uint8)
         if self.unstable:
             self._learn(image, np.asarray(room, np.uint8), step.learned(OLD_ROOM_KEPT))
+        elif self._moves:
+            self._learn(image, np.asarray(room, np.uint8), MOVING_RATE)
         elif updates:
             self._learn(image, np.asarray(room & (changed == 0), np.uint8), repeated(STEADY_RATE, updates))
             self._learn(image, np.asarray(room & (changed != 0), np.uint8), repeated(CHANGED_RATE, updates))
@@ -115,10 +145,14 @@ class MotionHistory:
         self._last = self._small(image)
         self.history: Mask = np.zeros_like(self._last)
 
-    def update(self, image: Image, step: Step) -> None:
-        """Take in the next picture."""
-        small = self._small(image)
-        moved = cv2.threshold(cv2.absdiff(small, self._last), MOTION_THRESHOLD, 255, cv2.THRESH_BINARY)[1]
+    def update(self, image: Image, shift: Shift, step: Step) -> None:
+        """Take in the next picture, in which the room has moved by `shift`."""
+        small, threshold = self._small(image), MOTION_THRESHOLD
+        if not shift.is_none:
+            matrix, size, threshold = shift.of_size(COARSE / 2), small.shape[1::-1], MOTION_THRESHOLD_MOVING
+            self.history = np.asarray(cv2.warpAffine(self.history, matrix, size, flags=cv2.INTER_NEAREST), np.uint8)
+            self._last = np.asarray(_warped(self._last, matrix, small), np.uint8)
+        moved = cv2.threshold(cv2.absdiff(small, self._last), threshold, 255, cv2.THRESH_BINARY)[1]
         fade = np.full_like(self.history, min(255, round(MOTION_FADES_PER_S * step.passed_s)))
         self.history = np.asarray(cv2.max(cv2.subtract(self.history, fade), moved), np.uint8)
         self._last = small
@@ -127,3 +161,9 @@ class MotionHistory:
     def _small(image: Image) -> Image:
         size = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
         return np.asarray(cv2.cvtColor(cv2.resize(image, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def _warped(picture: NDArray[Any], matrix: Matrix, bare: NDArray[Any]) -> NDArray[Any]:
+    """A picture moved by a matrix; what that lays bare is taken from `bare`, of the same size and type."""
+    size = picture.shape[1::-1]
+    return cv2.warpAffine(picture, matrix, size, bare.copy(), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_TRANSPARENT)

@@ -18,6 +18,7 @@ import numpy as np
 from deixis_schemas.anatomy import HEAD_WIDTH_M
 from numpy.typing import NDArray
 
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.frame import Image
 
 Maps = NDArray[np.float32]
@@ -49,6 +50,12 @@ class Surroundings:
         """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
         self._maps = maps
         self._x0, self._y0, self._scale = x0, y0, scale
+
+    def moved(self, shift: Shift) -> Surroundings:
+        """The same maps where the room has moved."""
+        height, width = (0.5 * STRIDE * self._scale * side for side in self._maps.shape[1:])
+        x, y = shift.moved(self._x0 + width, self._y0 + height)
+        return Surroundings(self._maps, x - width, y - height, self._scale)
 
     def heads(self, least: float) -> list[Seen]:
         """Heads of so high log odds, best first."""

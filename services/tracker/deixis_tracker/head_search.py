@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deixis_tracker.background import MotionHistory
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import look
 from deixis_tracker.finder import Finder, apart, search_scales
@@ -90,6 +91,11 @@ class HeadSearch:
         kept = [c for c in self.candidates if c not in believed and c.odds > -MOST_FOR and c.looks < MOST_LOOKS]
         self.candidates = sorted(kept, key=lambda c: -c.odds)[:MOST_CANDIDATES]
         return believed
+
+    def move(self, shift: Shift) -> None:
+        """Move the candidates with the room. What seemed to move then may have been the camera."""
+        for candidate in self.candidates:
+            candidate.x, candidate.y = shift.moved(candidate.x, candidate.y)
 
     def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
         """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from deixis_tracker.background import Background, MotionHistory
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import look, measure
 from deixis_tracker.finder import Finder, Seen
@@ -72,6 +73,12 @@ class HeadTracks:
             person.skin_centre = self._centre_of_skin(person, views.skin)
         self._find_heads(views, room, motion, skin, step)
         self._measure_faces(views, step)
+
+    def move(self, shift: Shift) -> None:
+        """Move all that is known with the room, where the camera moved."""
+        for person in self.persons:
+            person.move(shift)
+        self._search.move(shift)
 
     # --- those known --------------------------------------------------------------------------------------------------
 

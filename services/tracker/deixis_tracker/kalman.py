@@ -22,6 +22,10 @@ class PointFilter:
         """Spread of the position."""
         return math.sqrt(self._pp)
 
+    def shift_to(self, x: float, y: float) -> None:
+        """Move the point without moving in time: the picture moved under it."""
+        self.x, self.y = x, y
+
     def predict(self, dt_s: float) -> None:
         """Move on by `dt_s` seconds (white acceleration noise)."""
         self.x += self.vx * dt_s

@@ -14,6 +14,7 @@ import numpy as np
 from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_schemas.messages import FrontalFace, KindProbabilities, Track
 
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.classifier import HandBelief, HandKind
 from deixis_tracker.finder import Surroundings
 from deixis_tracker.frame import COARSE, Box, Mask, around, to_frame
@@ -85,6 +86,16 @@ class Person:
     def y(self) -> float:
         """Head centre."""
         return self.motion.y
+
+    def move(self, shift: Shift) -> None:
+        """Move head and hands with the room, where the camera moved: what is left of their motion is their own."""
+        self.motion.shift_to(*shift.moved(self.x, self.y))
+        if self.around is not None:
+            self.around = self.around.moved(shift)
+        for hand in self.hands:
+            x, y = hand.motion.x, hand.motion.y
+            hand.motion.shift_to(*shift.moved(x, y))
+            hand.pixels = np.asarray(hand.pixels + np.array([hand.motion.x - x, hand.motion.y - y]), np.float32)
 
     def head_box(self) -> Box:
         """Chin to brow, as wide as the head; around the head's centre also when the head is turned away."""

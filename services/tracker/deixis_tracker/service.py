@@ -33,7 +33,10 @@ def serve(node: Node, config: TrackerConfig) -> None:
                 if tracker.left_out:
                     node.count("persons_left_out", tracker.left_out)
                     node.warn("persons", f"more people are seen than max_persons: {config.max_persons} are followed")
-            out.put(Tracks.derive(frame, node.producer, width=frame.width, height=frame.height, tracks=tracks))
+            node.note("camera", "the camera moves: the room is followed" if tracker.camera_moves else None)
+            node.note("colour", "the picture is grey: hands are found by their shape alone" if tracker.is_grey else None)
+            said = {"width": frame.width, "height": frame.height, "room_offset_px": tracker.room_offset_px}
+            out.put(Tracks.derive(frame, node.producer, tracks=tracks, **said))
 
 
 def main(argv: list[str] | None = None) -> int:

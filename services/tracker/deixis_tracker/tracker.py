@@ -1,7 +1,7 @@
 """The tracker: frames in, face and hand tracks out (Pateraki et al. 2011, sec. 4).
 
-One frame passes: background -> skin colour -> heads and faces -> hand blobs -> association by propagated pixel hypotheses ->
-hand cut from the arm -> Kalman filter -> classifier.
+One frame passes: motion of the camera -> background -> skin colour -> heads and faces -> hand blobs -> association by
+propagated pixel hypotheses -> hand cut from the arm -> Kalman filter -> classifier.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from deixis_schemas.messages import Track
 from deixis_schemas.runs import RunClock
 
 from deixis_tracker.background import Background, MotionHistory
+from deixis_tracker.camera_motion import CameraMotion
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import load_cascade
 from deixis_tracker.finder import Finder
@@ -28,6 +29,7 @@ from deixis_tracker.skin import SkinModel
 LEAST_SIDE_PX = 32
 LONGEST_STEP_NS = 500_000_000
 FIRST_NS = 33_333_333  # the first frame of a run ends so late in it
+GREY_LEVELS, GREY_SHARE, GREY_CHECKED_S = 6, 0.995, 0.5  # channels that differ so little, in so much of the picture: no colour
 LEARN_ROOM_S, LEARN_ROOM_AHEAD_S = 1.5, 35 / 30  # the first time after a third of a second
 
 
@@ -46,6 +48,9 @@ class Tracker:
         self._clock = RunClock()
         self._began_ns = 0
         self._shape: tuple[int, int] = (0, 0)
+        self.camera_moves = False  # the camera itself moved just now
+        self.is_grey = False  # the picture has no colour, which says then nothing of skin
+        self.room_offset_px = (0.0, 0.0)  # how far the room has moved in the middle of the picture since the run began
         self._person_ids, self._track_ids = count(), count()
 
     @property
@@ -74,11 +79,14 @@ class Tracker:
         run_ns = moment.now_ns - self._began_ns
         passed_ns = min(LONGEST_STEP_NS, round(moment.elapsed_s * 1e9) or run_ns)
         self._step(image, work, 1 / scale, Step(moment.now_ns, run_ns, passed_ns))
+        self.room_offset_px = self._camera.offset[0] / scale, self._camera.offset[1] / scale
         return [track for person in self._heads.persons for track in tracks_of(person, moment.now_ns, 1 / scale)]
 
     def _reset(self, work: Image) -> None:
         size = work.shape[0], work.shape[1]
         coarse = coarsened(work)
+        self.is_grey = _is_grey(coarse)
+        self._camera = CameraMotion(coarse)
         self._room = Background(coarse, self._config.change_threshold)
         self._motion = MotionHistory(coarse)
         self._skin = SkinModel(self._config.prior_skin)
@@ -87,8 +95,11 @@ class Tracker:
         self._people: Mask = np.zeros(coarse.shape[:2], np.uint8)
 
     def _step(self, image: Image, work: Image, scale: float, step: Step) -> None:
-        views = self._view(image, work, scale)
-        self._motion.update(views.coarse, step)
+        coarse = coarsened(work)
+        if step.periods(GREY_CHECKED_S):
+            self.is_grey = _is_grey(coarse)
+        self._follow_camera(coarse, step)
+        views = self._view(image, work, coarse, scale)
         self._heads.update(views, self._room, self._motion, self._skin, step)
         persons = self._heads.persons
         if persons:
@@ -102,8 +113,25 @@ class Tracker:
             room = np.where((self._people == 0) | (views.skin < self._config.skin_low), 255, 0).astype(np.uint8)
             self._skin.adapt_room(views.coarse, room)
 
-    def _view(self, image: Image, work: Image, scale: float) -> Views:
+    def _follow_camera(self, coarse: Image, step: Step) -> None:
+        """Move what is known with the room, where the camera moved."""
+        shift = self._camera.update(coarse, self._people, step)
+        self.camera_moves = self._camera.moves
+        self._room.move(coarse, shift, self._camera.moves)
+        self._motion.update(coarse, shift, step)
+        if not shift.is_none:
+            self._heads.move(shift)
+            self._people = people_mask(self._heads.persons, (coarse.shape[0], coarse.shape[1]))
+
+    def _view(self, image: Image, work: Image, coarse: Image, scale: float) -> Views:
         grey = np.asarray(cv2.cvtColor(work, cv2.COLOR_BGR2GRAY), np.uint8)
-        coarse = coarsened(work)
         changed = self._room.changed(coarse, self._people)
-        return Views(image, scale, work, grey, coarse, self._skin.probability(coarse), changed)
+        # A face of no colour would teach that all that is as bright is skin.
+        skin = np.zeros(coarse.shape[:2], np.uint8) if self.is_grey else self._skin.probability(coarse)
+        return Views(image, scale, work, grey, coarse, skin, changed)
+
+
+def _is_grey(coarse: Image) -> bool:
+    """Whether the channels of a picture (H, W, 3) are the same."""
+    some = coarse[::4, ::4].astype(np.int16)
+    return float(np.mean(np.ptp(some, axis=2) <= GREY_LEVELS)) >= GREY_SHARE
