@@ -6,10 +6,12 @@ import math
 from pathlib import Path
 
 import numpy as np
+import onnx
 import torch
 from deixis_tracker.finder import PIXEL_MIDDLE, PIXEL_SPREAD
 from fit_windows import Windows
 from numpy.typing import NDArray
+from onnx import numpy_helper
 from torch import nn
 from torch.nn import functional as fn
 
@@ -18,6 +20,8 @@ SLOW_MEAN = 0.998
 FOUND_COUNTS = 12.0
 """A cell that belongs to a thing counts so many times as much as an empty one: there are few."""
 SIZES_COUNT = 0.3
+LAYERS = ("c1", "c2", "r1", "r2", "c3", "r3", "r4", "c4", "r5", "r6", "r7", "u8", "m8", "u4", "m4", "out")
+"""In the order in which they are evaluated."""
 
 
 class Network(nn.Module):  # type: ignore[misc]  # where PyTorch is not installed its types are not known
@@ -58,13 +62,36 @@ class Fit:
     """A network while it is fitted."""
 
     def __init__(self, start: Path | None = None) -> None:
-        """Begin anew, or go on from a checkpoint (.pt)."""
+        """Begin anew, or go on from a checkpoint (.pt) or from weights that were exported (.onnx)."""
         self._network = Network().to(memory_format=torch.channels_last)
-        if start is not None:
+        if start is not None and start.suffix == ".onnx":
+            load_exported(self._network, start)
+        elif start is not None:
             self._network.load_state_dict(torch.load(start))
         self._mean = {name: values.clone() for name, values in self._network.state_dict().items()}
         self._optimiser = torch.optim.AdamW(self._network.parameters(), lr=RATE, weight_decay=1e-3)
         self._steps = 0
+
+    def settle(self, windows: Windows) -> None:
+        """Give exported layers the means and spreads of these windows again, which the export has multiplied in."""
+        spreads: dict[nn.BatchNorm2d, tuple[torch.Tensor, torch.Tensor]] = {}
+
+        def note(layer: nn.BatchNorm2d, given: tuple[torch.Tensor], _: torch.Tensor) -> None:
+            spreads[layer] = given[0].mean((0, 2, 3)), given[0].var((0, 2, 3), unbiased=False)
+
+        self._network.eval()
+        layers = [layer for layer in self._network.modules() if isinstance(layer, nn.BatchNorm2d)]
+        hooks = [layer.register_forward_hook(note) for layer in layers]
+        with torch.no_grad():
+            self._network(_tensor(windows.pixels))
+            for layer, (mean, spread) in spreads.items():
+                layer.running_mean.copy_(mean)
+                layer.running_var.copy_(spread)
+                layer.weight.copy_(torch.sqrt(spread + layer.eps))
+                layer.bias.add_(mean)
+        for hook in hooks:
+            hook.remove()
+        self._mean = {name: values.clone() for name, values in self._network.state_dict().items()}
 
     def step(self, windows: Windows, share: float) -> float:
         """Learn from a batch; `share` of the training is done. Gives the loss."""
@@ -112,6 +139,21 @@ class Fit:
                     mean.mul_(keep).add_(values, alpha=1 - keep)
                 else:
                     mean.copy_(values)
+
+
+def load_exported(network: Network, path: Path) -> None:
+    """Weights of an exported network, whose layers have no means and spreads of their own any more."""
+    graph = onnx.load(str(path)).graph
+    values = {one.name: torch.from_numpy(numpy_helper.to_array(one).copy()) for one in graph.initializer}
+    nodes = [node for node in graph.node if node.op_type == "Conv"]
+    with torch.no_grad():
+        for name, node in zip(LAYERS, nodes, strict=True):
+            layer, (weight, bias) = getattr(network, name), (values[key] for key in node.input[1:3])
+            convolution, after = layer if isinstance(layer, nn.Sequential) else (layer, layer)
+            convolution.weight.copy_(weight)
+            after.bias.copy_(bias)
+            if after is not convolution:
+                after.weight.fill_(math.sqrt(1 + after.eps))
 
 
 def loss_of(answers: torch.Tensor, windows: Windows) -> torch.Tensor:

@@ -37,7 +37,7 @@ def main() -> int:
     parser.add_argument("--figures", type=int, default=15000, help="of fitting people (default: 15000)")
     parser.add_argument("--minutes", type=float, default=60.0, help="of training (default: 60)")
     parser.add_argument("--cache", type=Path, default=CACHE, help="folder of rendered figures and checkpoints")
-    parser.add_argument("--from", type=Path, dest="start", help="checkpoint (.pt) to go on from")
+    parser.add_argument("--from", type=Path, dest="start", help="checkpoint (.pt) or weights (.onnx) to go on from")
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="file to write")
     given = parser.parse_args()
     try:
@@ -49,6 +49,8 @@ def main() -> int:
     held_out = render(given.cache, [HELD_OUT_SEED])
     fit = Fit(given.start)
     with WindowMaker(fitting) as maker:
+        if given.start is not None and given.start.suffix == ".onnx":
+            fit.settle(maker.take())
         train(fit, maker, given.minutes, given.cache / "checkpoint.pt")
     fit.export(given.out)
     print_found(fit, Figures.load(held_out))

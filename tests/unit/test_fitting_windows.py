@@ -102,3 +102,18 @@ def test_the_network_answers_in_opencv_as_in_pytorch(tmp_path: Path):
     network = cv2.dnn.readNetFromONNX(np.fromfile(tmp_path / "network.onnx", np.uint8))
     network.setInput(cv2.dnn.blobFromImage(pixels[0], 1 / PIXEL_SPREAD, mean=(PIXEL_MIDDLE,) * 3))
     assert network.forward() == pytest.approx(fit.maps(pixels), abs=1e-3)
+
+
+def test_exported_weights_can_be_gone_on_from(tmp_path: Path):
+    pytest.importorskip("torch", reason="PyTorch is only needed for fitting")
+    pytest.importorskip("onnx", reason="ONNX is only needed for fitting")
+    from finder_network import Fit
+    from fit_windows import windows_of
+
+    fit, windows = Fit(), windows_of(figures(), 16, np.random.default_rng(1))
+    for _ in range(3):
+        fit.step(windows, 0.0)
+    fit.export(tmp_path / "network.onnx")
+    again = Fit(tmp_path / "network.onnx")
+    again.settle(windows)
+    assert again.maps(windows.pixels) == pytest.approx(fit.maps(windows.pixels), abs=1e-3)
