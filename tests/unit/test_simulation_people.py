@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from deixis_simulation.actor import Actor, Moment
 from deixis_simulation.avatars import AVATARS, FITTING_AVATARS, HELD_OUT_AVATARS, AvatarError, load_avatar
-from deixis_simulation.body import fit_body, head_factor
+from deixis_simulation.body import Body, fit_body, head_size
 from deixis_simulation.geometry import Floats, to_world, wrap_deg
 from deixis_simulation.rotations import azimuth_deg
 from deixis_simulation.scene import QUIET_GESTURES, ArmSide, Camera, Person, QuietGesture, Scene, ScenePoi
@@ -93,11 +93,17 @@ def test_a_body_has_its_height_and_stands_on_the_floor(height: float, name: str)
     assert abs(body.vertices[:, 1].min()) < 0.01
 
 
-def test_a_child_has_a_larger_head() -> None:
-    assert head_factor(1.2) == pytest.approx(1.15)
-    assert head_factor(1.75) == 1.0
-    child, adult = (fit_body(load_avatar("White_F_1_Casual"), height) for height in (1.2, 1.75))
-    assert child.head_scale / child.scale > adult.head_scale / adult.scale
+def breadth_m(body: Body) -> float:
+    """Of the head, ear to ear."""
+    return float(np.ptp(body.vertices[body.avatar.face_vertices][:, 0]))
+
+
+def test_heads_of_children_are_nearly_as_large_as_those_of_adults() -> None:
+    assert head_size(1.17, 1.7) == pytest.approx(51.5 / 56, abs=0.01)  # around, at six years and of adults
+    assert head_size(1.40, 1.7) == pytest.approx(53.5 / 56, abs=0.01)
+    child, adult, tall = (fit_body(load_avatar("White_F_1_Casual"), height) for height in (1.2, 1.7, 1.95))
+    assert 0.91 < breadth_m(child) / breadth_m(adult) < 0.94
+    assert 1.01 < breadth_m(tall) / breadth_m(adult) < 1.05
 
 
 # --- moments ----------------------------------------------------------------------------------------------------------
