@@ -15,8 +15,8 @@ from .scene import ArmSide
 
 FINGERS = ("Index", "Middle", "Ring", "Pinky")
 HEAD_GROWTH = 0.23
-"""Heads grow with this power of the height. Of children of 1.17 and 1.40 m (6 and 10 years) heads are 51.5 and 53.5 cm around, of
-adults of 1.70 m 56 cm, and tall and short adults differ as little. Scaled with the body a child's head was a fifth too
+"""Heads grow with this power of the height. Of children of 1.17 and 1.40 m (6 and 10 years) heads are 51.5 and 53.5 cm around,
+of adults of 1.70 m 56 cm, and tall and short adults differ as little. Scaled with the body a child's head was a fifth too
 small, and whoever measures distance by it was as far off.
 """
 
