@@ -364,6 +364,12 @@ class Evidence(Part):
     masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_LISTED, description="The sets of largest mass.")
 
 
+CONTOUR_CONFLICT = (
+    "1 - max over POIs of the product of hand's and head's likelihoods, each divided by its largest: 0 where both fit one POI, "
+    "near 1 where they contradict each other, at any number of POIs."
+)
+
+
 class PersonBelief(Part):
     """Belief about one person."""
 
@@ -375,7 +381,8 @@ class PersonBelief(Part):
     )
     pois_total: Count = Field(default=0, description="How many POIs the frame of discernment has.")
     unknown: Share = Field(default=1.0, description="Mass of the whole frame of discernment: what is not known.")
-    conflict: Share = 0.0
+    conflict: Share = Field(default=0.0, description="Mass that Dempster's rule divides away, 1 - K.")
+    contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
 
@@ -396,7 +403,8 @@ class Target(OfFrame):
     poi_ids: list[Name] = Field(max_length=MAX_POIS, description="The answer: one, several when tied, none on abstention.")
     pois: list[PoiBelief] = Field(default_factory=list, max_length=MAX_POIS, description="The likeliest, best first.")
     pois_total: Count = Field(default=0, description="How many POIs came into question.")
-    conflict: Share
+    conflict: Share = Field(description="Mass that Dempster's rule divides away, 1 - K.")
+    contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     reason: Text
     started_ns: Nanoseconds

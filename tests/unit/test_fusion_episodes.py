@@ -374,6 +374,32 @@ def test_a_stage_that_dies_during_a_stroke_counts_for_nothing_from_then_on() -> 
     assert after.unknown > before.unknown
 
 
+NO_GESTURE = {"gesture": ("dead", "gone, silent for 2.0 s")}
+
+
+@pytest.mark.parametrize(("dying", "statuses"), [("gesture", NO_GESTURE), ("headpose", DEAD)])
+def test_a_stage_that_dies_between_two_that_contradict_each_other_decides_nothing(dying: str, statuses: dict[str, Any]) -> None:
+    scene = Scene()
+    hand = gesture("point_left", hand="left", bearing_deg=60.0, bearing_sigma_deg=20)
+    scene.show(30, hand, pose(-56))
+    before = scene.beliefs[-1].persons[0]
+    scene.show(8, hand, pose(-56), without=(dying,), statuses=statuses)
+    after = scene.beliefs[-1].persons[0]
+    assert after.pois[0].pignistic <= before.pois[0].pignistic + 1e-9
+    scene.fusion.end(None)
+    answers = [set(target.poi_ids) for target in scene.targets]
+    assert answers[-1] == answers[0] or len(answers[-1]) != 1
+
+
+def test_a_stage_that_lives_again_is_heard_again() -> None:
+    scene = Scene()
+    scene.show(20, gesture(bearing_deg=60.0, bearing_sigma_deg=10), pose(60))
+    sure = scene.beliefs[-1].persons[0].pois[0].pignistic
+    scene.show(4, gesture(bearing_deg=60.0, bearing_sigma_deg=10), None, without=("headpose",), statuses=DEAD)
+    scene.show(20, gesture(bearing_deg=60.0, bearing_sigma_deg=10), pose(60))
+    assert scene.beliefs[-1].persons[0].pois[0].pignistic >= 0.95 * sure
+
+
 def test_a_stage_late_for_some_frames_of_a_stroke_still_counts_and_for_long_does_not() -> None:
     scene = Scene()
     scene.show(30, gesture(), pose(60))

@@ -141,7 +141,7 @@ def test_out_of_range_means_the_far_pois_on_that_side(side: Side, expected: set[
 
 
 def test_out_of_range_with_no_poi_out_there_is_vacuous() -> None:
-    assert head_assignment(HeadObservation(None), seen(-30, 0, 30), CONFIG.head).unknown == 1.0
+    assert head_assignment(HeadObservation(None), seen(-30, 0, 30), CONFIG.head).unknown == pytest.approx(1.0, abs=1e-6)
 
 
 @given(bearings, st.floats(-120, 120), st.floats(0.5, 40))
@@ -200,3 +200,47 @@ def test_close_contenders_are_tied_best_first() -> None:
 def test_wrapped_angles_stay_within_half_a_turn(angle: float) -> None:
     assert -180 <= wrapped_deg(angle) <= 180
     assert math.isclose(math.cos(math.radians(wrapped_deg(angle))), math.cos(math.radians(angle)), abs_tol=1e-6)
+
+
+# --- what was wrong, each once ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("config", [CONFIG, PAPER])
+def test_one_poi_in_sight_is_named_by_those_who_point_at_it(config: FusionConfig) -> None:
+    judged = judge(seen(60), HandObservation("point_left", 55.0, 10.0), HeadObservation(57.0, 4.0), config)
+    assert judged.poi_ids == ("P0",)
+
+
+@pytest.mark.parametrize("config", [CONFIG, PAPER])
+def test_one_poi_in_sight_is_not_named_where_nothing_was_observed(config: FusionConfig) -> None:
+    assert judge(seen(60), None, None, config).choice.abstains == "nothing was observed that tells the POIs apart"
+
+
+def test_one_poi_in_sight_is_not_named_by_those_who_point_away_from_it() -> None:
+    judged = judge(seen(60), HandObservation("point_right", -60.0, 10.0), HeadObservation(-60.0, 4.0))
+    assert judged.poi_ids == ()
+    assert "does not lie where hand and head point" in judged.choice.abstains
+
+
+@pytest.mark.parametrize("count", [2, 20, 200])
+def test_contour_conflict_is_low_in_agreement_and_high_in_contradiction_at_any_number_of_pois(count: int) -> None:
+    around = seen(*(-90 + 180 * i / (count - 1) for i in range(count)))
+    bearing = around[count // 8].bearing_deg
+    pointing = HandObservation("point_right", bearing, 8.0)
+    agrees = judge(around, pointing, HeadObservation(bearing, 4.0))
+    contradicts = judge(around, pointing, HeadObservation(-bearing, 4.0))
+    assert agrees.contour_conflict <= 0.06
+    assert contradicts.contour_conflict >= 0.97
+
+
+def test_hand_and_head_that_contradict_each_other_are_no_answer() -> None:
+    judged = judge(seen(*AROUND), HandObservation("point_left", 81.0, 8.0), HeadObservation(-81.0, 4.0))
+    assert judged.poi_ids == ()
+    assert "contradict each other" in judged.choice.abstains
+
+
+@given(st.floats(60, 179))
+def test_one_degree_more_of_the_farthest_poi_changes_what_out_of_range_says_by_little(degrees: float) -> None:
+    head = HeadObservation(None, None, "left")
+    here, farther = (head_assignment(head, seen(-30, 0, d), CONFIG.head).unknown for d in (degrees, degrees + 1))
+    assert abs(here - farther) < 0.12

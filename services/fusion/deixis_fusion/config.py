@@ -104,12 +104,22 @@ class EpisodesConfig(StageConfig):
 
 
 class AnswerConfig(StageConfig):
-    """When an answer is given, and how much of it is published."""
+    """When an answer is given, and how much of it is published.
+
+    `max_conflict` and `least_fit` let go of 1 to 3 % of strokes drawn from our own likelihoods, and of 20 to 45 % of those
+    whose head looks anywhere else, with 8 to 100 POIs: `python fitting/abstentions.py`.
+    """
 
     max_unknown: float = Field(default=0.9, gt=0, le=1, description="With more mass on the whole frame, abstain.")
     tie_margin: float = Field(default=0.08, ge=0, le=1, description="deixis: pignistic differences below this are ties.")
     max_ties: int = Field(default=3, ge=1, le=64, description="deixis: with more POIs tied, abstain.")
-    max_conflict: float = Field(default=0.97, gt=0, le=1, description="deixis: with more conflict, abstain.")
+    max_conflict: float = Field(default=0.98, gt=0, le=1, description="deixis: with more contour conflict, abstain.")
+    least_fit: float = Field(
+        default=0.01,
+        ge=0,
+        le=1,
+        description="deixis: a POI alone in sight is not named where it explains less of what was seen.",
+    )
     update_every_s: float = Field(default=0.2, ge=0, le=10, description="Updates of a target are at least this far apart.")
     rows: int = Field(default=16, ge=1, le=64, description="How many POIs are told of in a message, the likeliest first.")
 

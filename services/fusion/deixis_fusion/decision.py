@@ -31,8 +31,12 @@ class Rules(Protocol):
         """The assignment of a head; `seen` is not empty."""
         ...
 
-    def choose(self, combination: Combination) -> Choice:
-        """The answer to a belief that tells the POIs apart."""
+    def contour_conflict(self, evidence: Evidence, seen: Sequence[Candidate]) -> float:
+        """How much hand and head contradict each other, 0 to 1; `seen` is not empty."""
+        ...
+
+    def choose(self, combination: Combination, evidence: Evidence, seen: Sequence[Candidate]) -> Choice:
+        """The answer to a belief that tells the POIs apart, or that is about a single one."""
         ...
 
 
@@ -45,6 +49,7 @@ class Judgement:
     head: BeliefAssignment
     combination: Combination
     choice: Choice
+    contour_conflict: float = 0.0
 
     @cached_property
     def pignistic(self) -> list[float]:
@@ -60,14 +65,16 @@ class Judgement:
 def decide(seen: Sequence[Candidate], evidence: Evidence, rules: Rules, max_unknown: float) -> Judgement:
     """Weigh and combine; a source that observed nothing is vacuous. With more than `max_unknown` on the whole frame, abstain.
 
+    Of a single POI the whole frame is all there is: there it counts whether anything was observed.
     Raises ValueError where no POI is seen.
     """
     size = len(seen)
     hand = rules.hand(evidence.hand, seen) if evidence.hand is not None else vacuous(size)
     head = rules.head(evidence.head, seen) if evidence.head is not None else vacuous(size)
     combination = combine(hand, head)
-    if combination.belief.unknown > max_unknown:
+    silent = evidence.hand is None and evidence.head is None
+    if silent or (size > 1 and combination.belief.unknown > max_unknown):
         choice = Choice((), "nothing was observed that tells the POIs apart")
     else:
-        choice = rules.choose(combination)
-    return Judgement(seen, hand, head, combination, choice)
+        choice = rules.choose(combination, evidence, seen)
+    return Judgement(seen, hand, head, combination, choice, rules.contour_conflict(evidence, seen))

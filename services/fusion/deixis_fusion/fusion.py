@@ -22,6 +22,7 @@ from deixis_schemas.messages import (
 )
 from deixis_schemas.runs import RunClock
 
+from .caution import Caution
 from .config import FusionConfig
 from .decision import Rules, decide
 from .deixis_rules import DeixisRules
@@ -66,6 +67,7 @@ class _Person:
         self.locator = PersonLocator(config.place)
         self.episodes = EpisodeTracker(person_id, config.episodes)
         self.published: _Published | None = None
+        self.caution = Caution()
         self.seen_ns = 0
 
 
@@ -180,6 +182,8 @@ class Fusion:
         targets = self._final(person, person.episodes.observe(sample), moment, moment.now_ns)
         stroke, episode = person.episodes.stroke, person.episodes.open_episode
         evidence = gather(stroke.samples if stroke else (), sample, moment.stages, self._config.episodes)
+        if stroke is None:
+            person.caution.forget()
         assessment = self._assess(person, evidence, moment)
         if episode is not None and self._is_news(person, assessment, moment):
             targets.append(self._tell(person, episode, assessment, moment, moment.now_ns))
@@ -203,6 +207,8 @@ class Fusion:
         if place is not None:
             seen = frame_of_discernment(place, self._pois, self._walls, self._config.place.wall_clearance_m)
             judgement = decide(seen, evidence, self._rules, self._config.answer.max_unknown) if seen else None
+        if judgement is not None:
+            judgement = person.caution.judged(judgement, evidence)
         return Assessment(place, evidence, judgement, self._pois, moment.robot.doubt)
 
     def _final(self, person: _Person, ended: Stroke | None, moment: _Moment, now_ns: int | None) -> list[Target]:

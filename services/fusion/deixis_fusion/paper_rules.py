@@ -14,7 +14,7 @@ from typing import Literal
 from .belief import BeliefAssignment, Combination, as_set, members, normalised
 from .config import PaperConfig
 from .decision import Choice
-from .evidence import HandObservation, HeadObservation, PointingGesture
+from .evidence import Evidence, HandObservation, HeadObservation, PointingGesture
 from .localisation import wrapped_deg
 from .visibility import Candidate
 
@@ -52,7 +52,15 @@ class PaperRules:
         ]
         return face_assignment(likelihoods, None)
 
-    def choose(self, combination: Combination) -> Choice:
+    def contour_conflict(self, evidence: Evidence, seen: Sequence[Candidate]) -> float:
+        """Of the single POIs' plausibilities; the paper has no such measure."""
+        if evidence.hand is None or evidence.head is None:
+            return 0.0
+        hand, head = self.hand(evidence.hand, seen).plausibilities(), self.head(evidence.head, seen).plausibilities()
+        most = max(hand) * max(head)
+        return 1 - max(a * b for a, b in zip(hand, head, strict=True)) / most if most > 0 else 1.0
+
+    def choose(self, combination: Combination, _evidence: Evidence, _seen: Sequence[Candidate]) -> Choice:
         """The union of the focal sets of largest mass."""
         return Choice(largest_focal_sets(combination.belief))
 

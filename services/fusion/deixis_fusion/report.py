@@ -61,6 +61,11 @@ class Assessment(NamedTuple):
         """Conflict mass 1 - K."""
         return self.judgement.combination.conflict if self.judgement else 0.0
 
+    @property
+    def contour_conflict(self) -> float:
+        """How much hand and head contradict each other."""
+        return self.judgement.contour_conflict if self.judgement else 0.0
+
 
 class PersonReport(NamedTuple):
     """The standing of one person, from which messages of any length are made. `now_ns` is none where time stands still."""
@@ -83,6 +88,7 @@ class PersonReport(NamedTuple):
             pois_total=len(judgement.seen) if judgement else len(unplaced),
             unknown=judgement.combination.belief.unknown if judgement else 1.0,
             conflict=told.conflict,
+            contour_conflict=told.contour_conflict,
             evidence=_evidence(told, self.now_ns),
             episode_id=self.episode_id,
         )
@@ -114,6 +120,7 @@ class TargetReport:
             pois=_rows(told.judgement, rows) if told.judgement else [],
             pois_total=len(told.judgement.seen) if told.judgement else 0,
             conflict=told.conflict,
+            contour_conflict=told.contour_conflict,
             evidence=_evidence(told, self.now_ns),
             reason=explain(told),
             started_ns=self.started_ns,
@@ -229,8 +236,8 @@ def _runner_up(judgement: Judgement) -> str:
 
 
 def _doubt(judgement: Judgement) -> str:
-    conflict = judgement.combination.conflict
-    return f"; hand and head disagree (conflict {conflict:.2f})" if conflict > NOTABLE_CONFLICT else ""
+    conflict = judgement.contour_conflict
+    return f"; hand and head disagree (contour conflict {conflict:.2f})" if conflict > NOTABLE_CONFLICT else ""
 
 
 def title(poi: Poi) -> str:
