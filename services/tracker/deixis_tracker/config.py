@@ -26,6 +26,13 @@ class TrackerConfig(StageConfig):
         le=30,
         description="What looks, each worth 1 at most, add up to before a head is believed.",
     )
+    hand_odds: float = Field(
+        default=0.6,
+        ge=-5,
+        le=10,
+        description="Log odds of the finder that speak neither for a hand nor against it. Chosen among 0.3, 0.6 and 1 by "
+        "`deixis eval --stage tracker --seeds 1000:1012 --set tracker.hand_odds=...`",
+    )
     lose_face_after_s: float = Field(default=2.5, gt=0, le=60, description="A head not seen as one for so long is dropped.")
     lose_hand_after_s: float = Field(default=0.5, gt=0, le=60, description="A hand not seen for so long is dropped.")
     prior_skin: float = Field(default=0.2, gt=0, lt=1, description="Share of skin expected among the pixels judged.")

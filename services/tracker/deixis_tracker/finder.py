@@ -24,13 +24,13 @@ from deixis_tracker.frame import Image
 Maps = NDArray[np.float32]
 
 STRIDE, GRAIN = 4, 16  # pixels of a cell; what the sides of its pictures are multiples of
-USUAL_PX = 12.0  # width of a head in the surroundings of a known one
+USUAL_PX = 14.0  # width of a head in the surroundings of a known one
 PIXEL_MIDDLE, PIXEL_SPREAD = 115.0, 60.0
 WIDTH_PER_BREADTH = HEAD_WIDTH_M / 0.185  # width of a head, by its breadth ear to ear, which the network was fitted to
 KNOWN_PX = (6.5, 30.0)  # breadths of heads that it knows
 HEAD, RIGHT_HAND, LEFT_HAND, BREADTH = range(4)
 LEAST_SIDE_PX = 48  # a smaller picture shows no head with what is around it
-WIDE, ABOVE, BELOW = 5.3, 4.0, 6.7  # surroundings of a head that are looked at, head widths; an arm is about 4.5 long
+WIDE, ABOVE, BELOW = 5.3, 3.2, 6.2  # surroundings of a head that are looked at, head widths; an arm is about 4.5 long
 NEAREST = 0.6  # two heads of one picture are so many widths apart, at least
 
 

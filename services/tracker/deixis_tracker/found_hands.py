@@ -17,7 +17,6 @@ from deixis_tracker.frame import Box, Mask, Views, around
 from deixis_tracker.persons import Person
 from deixis_tracker.segmentation import Blob
 
-LEAST_ODDS = 1.0
 REACH, MIDDLE, USUAL = 0.62, 0.14, 0.3  # head widths: farthest part of a hand, what is surely hand, a hand taken for a disk
 BESIDE = 1.6  # head widths from the head; nearer, shoulders of arms that move pass for hands
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
@@ -51,7 +50,7 @@ def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
     seen = []
     for person in persons:
         for kind in (RIGHT_HAND, LEFT_HAND):
-            hands = (Place(person, hand) for hand in _hands(person, kind))
+            hands = (Place(person, hand) for hand in _hands(person, kind, config.hand_odds))
             near = [place for place in hands if BESIDE < person.distance(place.hand.x, place.hand.y) < config.reach]
             seen += near[:1]
     kept: list[Place] = []
@@ -61,8 +60,8 @@ def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
     return kept
 
 
-def _hands(person: Person, kind: int) -> list[Seen]:
-    return person.around.hands(kind, LEAST_ODDS) if person.around is not None else []
+def _hands(person: Person, kind: int, least: float) -> list[Seen]:
+    return person.around.hands(kind, least) if person.around is not None else []
 
 
 def _apart(place: Place, other: Place) -> bool:
@@ -87,7 +86,7 @@ def _blob(views: Views, place: Place, config: TrackerConfig) -> Blob:
     mask = _about_middle(_alike(np.asarray(views.full[rows, columns], np.float32), away), away)
     if not config.min_hand_area * w * w <= np.count_nonzero(mask) <= MOST_AREA * w * w:
         mask = np.asarray(away <= USUAL, np.uint8)
-    evidence = float(1 / (1 + np.exp(LEAST_ODDS - min(hand.odds, 10.0))))
+    evidence = float(1 / (1 + np.exp(config.hand_odds - min(hand.odds, 10.0))))
     return Blob(mask, columns.start, rows.start, int(np.count_nonzero(mask)), evidence, SURE, place.person.person_id)
 
 

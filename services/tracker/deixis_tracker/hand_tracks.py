@@ -23,7 +23,6 @@ LEAP, MOST_LEAP = 0.5, 3.0  # head widths between two sightings of one hand, bes
 UNSEEN_SPEED_KEPT = 0.6**30  # of a hand that is not seen, per second
 EVIDENCE_KEPT = 0.995**30  # per second
 LEAST_SUPPORT = 0.15
-DOUBTFUL = 1.0  # log odds of the finder that speak neither for a hand nor against it
 ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
 LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
@@ -102,7 +101,7 @@ class HandTracks:
             return False
         track.motion.correct(*hand.centroid, 0.06 * person.width)
         self._take_in(person, track, hand, blob, step)
-        track.belief.update(_features(person, track, hand, blob), step.passed_s)
+        track.belief.update(_features(person, track, hand, blob, self._config.hand_odds), step.passed_s)
         return True
 
     def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, step: Step) -> None:
@@ -110,7 +109,9 @@ class HandTracks:
         track.blob, track.seen_ns = hand, step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
-        track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(_odds(person, hand))))
+        track.evidence = max(
+            step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(_odds(person, hand, self._config.hand_odds)))
+        )
 
     def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
         """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
@@ -128,7 +129,7 @@ class HandTracks:
             motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
             track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
-            track.belief.update(_features(person, track, hand, blob), 1.0)
+            track.belief.update(_features(person, track, hand, blob, self._config.hand_odds), 1.0)
             person.hands.append(track)
 
     def _settle(self, person: Person, step: Step) -> None:
@@ -167,20 +168,20 @@ def _one_per_arm(claims: list[int], tracks: list[Claim]) -> list[int]:
     return sorted(kept.values())
 
 
-def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob) -> Features:
+def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob, doubtful: float) -> Features:
     w = person.width
     speed = math.hypot(track.motion.vx, track.motion.vy) / w
     dx, dy = (track.motion.x - person.x) / w, (track.motion.y - person.y) / w
-    right, left = _odds(person, hand)
+    right, left = _odds(person, hand, doubtful)
     return Features(dx, dy, speed, hand.area / w**2, max(blob.evidence, _share(max(right, left))), blob.sure, right, left)
 
 
-def _odds(person: Person, hand: Hand) -> tuple[float, float]:
-    """The finder's log odds of a right and of a left hand there; 0 where it has not looked."""
+def _odds(person: Person, hand: Hand, doubtful: float) -> tuple[float, float]:
+    """The finder's log odds of a right and of a left hand there, beyond `doubtful` ones; 0 where it has not looked."""
     if person.around is None:
         return 0.0, 0.0
     right, left = (person.around.odds_near(kind, *hand.centroid, ODDS_NEAR * person.width) for kind in (RIGHT_HAND, LEFT_HAND))
-    return (right - DOUBTFUL, left - DOUBTFUL) if math.isfinite(right) else (0.0, 0.0)
+    return (right - doubtful, left - doubtful) if math.isfinite(right) else (0.0, 0.0)
 
 
 def _share(odds: float) -> float:

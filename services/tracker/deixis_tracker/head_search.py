@@ -17,6 +17,7 @@ from deixis_tracker.faces import look
 from deixis_tracker.finder import Finder, apart, search_scales
 from deixis_tracker.frame import COARSE, Step, Views, around
 from deixis_tracker.persons import Person
+from deixis_tracker.sway import Glimpse
 
 SEARCH_S = 0.5  # all scales, once somebody is tracked
 SCALE_S = 1 / 30  # one scale, before
@@ -43,8 +44,9 @@ class Candidate:
     odds: float
     seen_ns: int
     looks: int = 1
-    alive: bool = False  # it moved, or a face was seen from the front
+    alive: bool = False  # it moved or swayed, or a face was seen from the front
     disturbed_ns: int = -(10**18)  # when its motion said nothing last
+    glimpse: Glimpse | None = None  # how the place was seen first
 
     def is_near(self, x: float, y: float, widths: float) -> bool:
         """Whether a place is so many head widths away at most."""
@@ -86,7 +88,10 @@ class HeadSearch:
         earlier = [candidate for candidate in self.candidates if candidate.seen_ns < step.now_ns]
         for candidate in sorted(earlier, key=lambda c: c.looks)[:LOOKS_A_FRAME]:
             self._look(candidate, views, step)
-            candidate.alive = candidate.alive or self._moves(candidate, motion, step) or _is_face(candidate, views)
+            if not candidate.alive:
+                candidate.alive = (
+                    self._moves(candidate, motion, step) or _is_face(candidate, views) or _sways(candidate, views, step)
+                )
         believed = [c for c in self.candidates if c.alive and c.odds >= self._config.confirm_odds]
         kept = [c for c in self.candidates if c not in believed and c.odds > -MOST_FOR and c.looks < MOST_LOOKS]
         self.candidates = sorted(kept, key=lambda c: -c.odds)[:MOST_CANDIDATES]
@@ -96,6 +101,7 @@ class HeadSearch:
         """Move the candidates with the room. What seemed to move then may have been the camera."""
         for candidate in self.candidates:
             candidate.x, candidate.y = shift.moved(candidate.x, candidate.y)
+            candidate.glimpse = None
 
     def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
         """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""
@@ -134,6 +140,17 @@ class HeadSearch:
 
 def _is_face(candidate: Candidate, views: Views) -> bool:
     return look(views.grey, candidate.x, candidate.y, candidate.width) is not None
+
+
+def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
+    """Whether it sways as people do who stand still; where known people are about, what passes before it seems to."""
+    if step.now_ns - candidate.disturbed_ns < DISTURBED_S * 1e9:
+        candidate.glimpse = None
+        return False
+    if candidate.glimpse is None:
+        candidate.glimpse = Glimpse.of(views.grey, candidate.x, candidate.y, candidate.width, step.now_ns)
+        return False
+    return candidate.glimpse.sways(views.grey, step.now_ns)
 
 
 def worth(odds: float) -> float:
