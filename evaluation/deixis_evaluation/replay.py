@@ -132,10 +132,10 @@ def replay_headpose(given: Given) -> Sequence[Message]:
 def replay_gesture(given: Given) -> Sequence[Message]:
     """Tracks to Gestures."""
     producer, recognizer = Producer("gesture", INSTANCE), GestureRecognizer(GestureConfig())
-    lens, made = Lens.of(given.camera()), []
+    lens, mount, made = Lens.of(given.camera()), given.camera().mount, []
     for seen in given.of(Tracks):
         size, offset = (seen.width, seen.height), seen.room_offset_px
-        gestures = recognizer.update(seen.tracks, *size, lens, seen.run, seen.stamp_ns, offset)
+        gestures = recognizer.update(seen.tracks, *size, lens, seen.run, seen.stamp_ns, offset, mount)
         made.append(Gestures.derive(seen, producer, gestures=gestures))
     return made
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from deixis_schemas.messages import CameraInfo
+from deixis_schemas.messages import CameraInfo, CameraMount
 
 from .lens import Lens, LensError
 
@@ -15,6 +15,7 @@ class CameraLens:
     def __init__(self, horizontal_fov_deg: float) -> None:
         self._fov_deg = horizontal_fov_deg
         self._told: Lens | None = None
+        self.mount = CameraMount()  # how the camera sits on its robot, as last told
 
     def hear(self, infos: Iterable[CameraInfo]) -> None:
         """Take what the camera says of itself, oldest first.
@@ -23,7 +24,7 @@ class CameraLens:
         """
         for info in infos:
             try:
-                self._told = Lens.of(info)
+                self._told, self.mount = Lens.of(info), info.mount
             except LensError:
                 continue
 

@@ -293,6 +293,10 @@ class HeadPoses(OfFrame):
 # --- gesture ----------------------------------------------------------------------------------------------------------
 
 
+BEARING_STEP_DEG = 5
+BEARINGS = 360 // BEARING_STEP_DEG
+
+
 class Gesture(Part):
     """What the gesturing hand of one person does."""
 
@@ -306,11 +310,19 @@ class Gesture(Part):
     bearing_mirrored: bool = Field(
         default=False, description="The stage cannot tell bearing b from 180 - b (in front of the person or behind)."
     )
+    bearing_likelihood: list[Share] = Field(
+        default_factory=list,
+        max_length=BEARINGS,
+        description="How likely what is seen is if the person points to bearing -180, -175 ... 175 degrees, beside the best; "
+        "empty, or all of them. It says more than mean and sigma do: front and back, and what no arm does.",
+    )
 
     @model_validator(mode="after")
     def _bearing_has_sigma(self) -> Self:
         if (self.bearing_deg is None) != (self.bearing_sigma_deg is None):
             raise ValueError("bearing_sigma_deg: bearing_deg and bearing_sigma_deg come together")
+        if self.bearing_likelihood and (len(self.bearing_likelihood) != BEARINGS or max(self.bearing_likelihood) <= 0):
+            raise ValueError(f"bearing_likelihood: {BEARINGS} shares, one at least above 0")
         return self
 
 

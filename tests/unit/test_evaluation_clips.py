@@ -9,7 +9,7 @@ from deixis_camera.calibration import load_calibration
 from deixis_evaluation.camera_pose import map_position, mount_of, path_of
 from deixis_evaluation.clips import Clip, ClipError, TrueView, Truth, load_clips, load_truth
 from deixis_evaluation.truth_site import write_site
-from deixis_fusion.localisation import to_base
+from deixis_runtime.mount import to_base
 from deixis_runtime.site import load_site
 from hypothesis import given
 from hypothesis import strategies as st

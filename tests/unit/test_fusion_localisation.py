@@ -24,10 +24,10 @@ from deixis_fusion.localisation import (
     bearing_with_sigma_deg,
     depth_of_face,
     locate,
-    to_base,
 )
 from deixis_fusion.visibility import frame_of_discernment, sees
 from deixis_runtime.lens import LensError
+from deixis_runtime.mount import to_base
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Poi, Track
 from hypothesis import given

@@ -6,13 +6,14 @@ import cv2
 import numpy as np
 import pytest
 from deixis_gesture.arm import Arm
+from deixis_gesture.bearing import HandSight
 from deixis_gesture.config import GestureConfig
 from deixis_gesture.hand import Face
 from deixis_gesture.person import View
 from deixis_gesture.recognizer import GestureRecognizer
 from deixis_runtime.lens import Lens
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import Gestures, KindProbabilities, Producer, Track, Tracks
+from deixis_schemas.messages import CameraMount, Gestures, KindProbabilities, Producer, Track, Tracks
 from pydantic import ValidationError
 
 LENS = Lens(640, 480, (560.0, 560.0, 319.5, 239.5))
@@ -203,8 +204,10 @@ def test_a_frame_of_twice_the_size_through_the_same_lens_gives_the_same_gestures
 
 @pytest.mark.parametrize("focal_px", [300.0, 560.0, 1200.0])
 def test_a_persons_distance_follows_from_the_lens(focal_px):
-    view = View(Lens(640, 480, (focal_px, focal_px, 319.5, 239.5)), (640, 480))
-    assert view.distance_of(Face(320.0, 150.0, focal_px * FACE_WIDTH_M / 2.0)) == pytest.approx(2.0 / FACE_WIDTH_M)
+    view = View(Lens(640, 480, (focal_px, focal_px, 319.5, 239.5)), (640, 480), CameraMount())
+    face = Face(320.0, 150.0, focal_px * FACE_WIDTH_M / 2.0)
+    tip = view.tip_of(face, HandSight(0.0, 0.0, 0.3, 0.3))
+    assert math.hypot(tip.distance, tip.height) == pytest.approx(2.0 / FACE_WIDTH_M)
 
 
 def test_a_hand_that_is_held_still_is_still_for_a_camera_that_turns():

@@ -20,7 +20,7 @@ def lenses(monkeypatch):
     """The lens that each frame was seen through."""
     used = []
 
-    def update(_recognizer, _tracks, _width, _height, lens, _run, _stamp_ns, _room_offset_px):
+    def update(_recognizer, _tracks, _width, _height, lens, _run, _stamp_ns, _room_offset_px, _mount):
         used.append(lens)
         return []
 

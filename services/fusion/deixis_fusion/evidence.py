@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeVar
 
-from deixis_schemas.messages import Gesture, HeadPose, Side, SourceStatus
+from deixis_schemas.messages import BEARINGS, Gesture, HeadPose, Side, SourceStatus
 
 from .config import EpisodesConfig
 from .joining import GESTURE, HEADPOSE, JoinedFrame
@@ -71,7 +71,8 @@ Weighed = Sequence[tuple[Sample, float]]
 class HandObservation:
     """A pointing stroke: the gesture recognised and, where it could be told, the bearing pointed to and by which hand.
 
-    `mirrored`: the bearing may as well be 180 - bearing. `agreement` is the share of the frames that said so.
+    `mirrored`: the bearing may as well be 180 - bearing. `agreement` is the share of the frames that said so. `likelihood` is
+    that of bearings -180, -175 ... 175, where the stage tells it: it then counts instead of bearing and sigma.
     """
 
     gesture: PointingGesture
@@ -80,6 +81,7 @@ class HandObservation:
     mirrored: bool = False
     agreement: float = 1.0
     hand: Side | None = None
+    likelihood: tuple[float, ...] = ()
 
     @property
     def mirror_deg(self) -> float | None:
@@ -181,7 +183,16 @@ def hand_over(weighed: Weighed) -> HandObservation | None:
     bearings = [(_in_front(g.bearing_deg or 0.0) if mirrored else (g.bearing_deg or 0.0), w) for g, w in told]
     bearing, spread = median_and_spread(bearings)
     stated, _ = median_and_spread([(g.bearing_sigma_deg or 0.0, w) for g, w in told])
-    return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand)
+    return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, _mean_likelihood(told))
+
+
+def _mean_likelihood(told: Sequence[tuple[Gesture, float]]) -> tuple[float, ...]:
+    """Of the frames together: their mean, for they show nearly the same, and where they differ either may be right."""
+    curves = [(gesture.bearing_likelihood, weight) for gesture, weight in told if gesture.bearing_likelihood]
+    if not curves:
+        return ()
+    total = math.fsum(weight for _, weight in curves)
+    return tuple(math.fsum(curve[i] * weight for curve, weight in curves) / total for i in range(BEARINGS))
 
 
 def _vote(weighted: Weighed) -> tuple[PointingGesture, float]:

@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from deixis_schemas.messages import Side
+import numpy as np
+from deixis_schemas.messages import BEARING_STEP_DEG, Side
 
 from .config import HandConfig, HeadConfig
 from .evidence import HandObservation, HeadObservation, PointingGesture
@@ -53,6 +54,9 @@ def fit(likelihood: Callable[[Sequence[Candidate]], Likelihoods], candidate: Can
 def hand_likelihoods(hand: HandObservation, seen: Sequence[Candidate], config: HandConfig) -> Likelihoods:
     """P(gesture | bearing) P(hand's bearing | bearing) of each POI."""
     gestures = [_gesture_likelihood(hand.gesture, candidate.bearing_deg, config) for candidate in seen]
+    if hand.likelihood:
+        curve = _curve_likelihoods(hand.likelihood, seen, config)
+        return [gesture * value for gesture, value in zip(gestures, curve, strict=True)]
     measured = [bearing for bearing in (hand.bearing_deg, hand.mirror_deg) if bearing is not None]
     if not measured:
         return gestures
@@ -80,6 +84,18 @@ def _bearing_likelihood(measured: Sequence[float], sigma: float, candidate: Cand
     spread = math.hypot(sigma, candidate.bearing_sigma_deg)
     hit = sum(normal(wrapped_deg(value - candidate.bearing_deg), spread) for value in measured) / len(measured)
     return (1 - outlier) * hit + outlier / FULL_CIRCLE_DEG
+
+
+def _curve_likelihoods(curve: Sequence[float], seen: Sequence[Candidate], config: HandConfig) -> Likelihoods:
+    """P(hand | POI), per degree, by the stage's own likelihood of bearings, blurred by how surely the POI's is known."""
+    told = np.array(curve)
+    density = told / (told.sum() * BEARING_STEP_DEG)
+    bearings = np.array([candidate.bearing_deg for candidate in seen])
+    sigma = np.array([max(candidate.bearing_sigma_deg, config.sigma_floor_deg) for candidate in seen])
+    off = (bearings[:, None] - np.arange(-180.0, 180.0, BEARING_STEP_DEG) + 180) % 360 - 180
+    weights = np.exp(-0.5 * (off / sigma[:, None]) ** 2)
+    hit = (weights @ density) / weights.sum(axis=1)
+    return [float(value) for value in (1 - config.outlier) * hit + config.outlier / FULL_CIRCLE_DEG]
 
 
 # --- the head ---------------------------------------------------------------------------------------------------------

@@ -9,12 +9,11 @@ import math
 from dataclasses import dataclass
 
 from deixis_runtime.lens import Lens
+from deixis_runtime.mount import Vector, to_base
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Track, Tracks
 
 from .config import PlaceConfig
-
-Vector = tuple[float, float, float]
 
 # What a message can say of a position, to either side of the map's origin.
 FARTHEST_M = 1e5
@@ -74,17 +73,6 @@ def locate(camera: Camera, robot: RobotPlace, head: HeadSighting, sigma: float) 
 def depth_of_face(lens: Lens, width_px: float, image_size: tuple[int, int]) -> float:
     """Distance along the optical axis, metres, of a face `width_px` wide from ear to ear in a picture of that size."""
     return lens.focal_x_px(image_size) * FACE_WIDTH_M / width_px
-
-
-def to_base(optical: Vector, mount: CameraMount) -> Vector:
-    """A direction in the optical frame turned into `base_link`: by the mount's roll, then its pitch, then its yaw."""
-    roll, pitch, yaw = (math.radians(angle) for angle in (mount.roll_deg, mount.pitch_up_deg, mount.yaw_deg))
-    right = optical[0] * math.cos(roll) - optical[1] * math.sin(roll)
-    down = optical[0] * math.sin(roll) + optical[1] * math.cos(roll)
-    forward, left, up = optical[2], -right, -down
-    ahead = forward * math.cos(pitch) - up * math.sin(pitch)
-    z = forward * math.sin(pitch) + up * math.cos(pitch)
-    return ahead * math.cos(yaw) - left * math.sin(yaw), ahead * math.sin(yaw) + left * math.cos(yaw), z
 
 
 def bearing_deg(place: PersonPlace, target_m: Vector) -> float:

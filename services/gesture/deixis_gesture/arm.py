@@ -23,8 +23,6 @@ SIDE_TIME_S = 0.205
 MEASURED_S = 0.48
 # The outline is worth its cost only near a stroke: hands lower than this below the face are at rest.
 LOW = 3.6
-# An arm across the body does not reach farther beyond the face, face widths.
-FARTHEST_ACROSS = 3.0
 
 
 class Arm:
@@ -69,17 +67,10 @@ class Arm:
         sights = [sight for _, sight in self._measures]
         return HandSight(
             statistics.median(sight.offset for sight in sights),
+            statistics.median(sight.drop for sight in sights),
             statistics.median(sight.finger for sight in sights),
             statistics.median(sight.palm for sight in sights),
         )
-
-    @property
-    def is_across(self) -> bool:
-        """The hand is on the other side of the body. A hand too far out for that has been given the wrong side."""
-        sight = self.sight
-        if sight is None or self.side is None or abs(sight.offset) > FARTHEST_ACROSS:
-            return False
-        return (sight.offset > 0) != (self.side == "left")
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""
@@ -110,7 +101,7 @@ class Arm:
 
     def _measure(self, hand: HandShape, time_s: float) -> None:
         finger = self.fingers[0].length if self.fingers else 0.0
-        self._measures.append((time_s, HandSight(hand.tip[0], finger, hand.palm_radius)))
+        self._measures.append((time_s, HandSight(hand.tip[0], hand.tip[1], finger, hand.palm_radius)))
         while time_s - self._measures[0][0] > MEASURED_S:
             self._measures.popleft()
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from deixis_runtime.lens import Lens
-from deixis_schemas.messages import Gesture, Track
+from deixis_runtime.mount import Vector, to_base
+from deixis_schemas.messages import CameraMount, Gesture, Track
 
 from .arm import Arm
-from .bearing import Bearing, estimate_bearing
+from .bearing import Bearing, HandSight, TipSight, estimate_bearing
 from .config import GestureConfig
 from .hand import Face
 
@@ -18,6 +19,8 @@ from .hand import Face
 WIDTH_TIME_S = 0.7
 PLACE_TIME_S = 0.12
 LEAST_FACE_PX = 6.0
+# Of a head the middle is so far above that of its face's box, which goes from chin to brow; face widths.
+HEAD_ABOVE_FACE = 0.08
 # A hand that comes back within this of where one was lost is the same hand, face widths.
 SAME_HAND = 1.2
 # A person seen for less than this may stand with resting hands raised: nobody saw them being raised.
@@ -26,17 +29,32 @@ POINTING = ("point_left", "point_right", "invisible")
 
 
 class View(NamedTuple):
-    """What a frame was taken through: the lens, the frame's size (width, height), and how far the room moved in the picture
-    since the frame before, pixels.
+    """What a frame was taken through: the lens, the frame's size (width, height), how the camera sits, and how far the room
+    moved in the picture since the frame before, pixels.
     """
 
     lens: Lens
     size: tuple[int, int]
+    mount: CameraMount
     room_went_px: tuple[float, float] = (0.0, 0.0)
 
-    def distance_of(self, face: Face) -> float:
-        """How far away a face of this width is, face widths."""
-        return self.lens.pinhole_at((face.x_px, face.y_px), self.size).focal_px / face.width_px
+    def tip_of(self, face: Face, sight: HandSight) -> TipSight:
+        """The fingertip of a person with this face, as a level camera sees it that looks at the head."""
+        head = (face.x_px, face.y_px - HEAD_ABOVE_FACE * face.width_px)
+        x, y, z = self._level(head)
+        tip_x, tip_y, tip_z = self._level(face.pixels((sight.offset, sight.drop)))
+        floor, tip_floor = math.hypot(x, y), math.hypot(tip_x, tip_y)
+        # Far beside the axis a picture shows things larger: the lens near the face says how far it is along the sight.
+        away = self.lens.pinhole_at(head, self.size).focal_px / face.width_px
+        distance = away * floor / math.hypot(floor, z)
+        ahead = (x * tip_x + y * tip_y) / floor
+        right = (y * tip_x - x * tip_y) / floor
+        return TipSight(right / max(ahead, 1e-3 * tip_floor), tip_z / tip_floor, distance, distance * z / floor)
+
+    def _level(self, pixel: tuple[float, float]) -> Vector:
+        """Direction of a pixel: forward, left, up."""
+        x, y = self.lens.ray(pixel, self.size)
+        return to_base((x, y, 1.0), self.mount)
 
 
 class Person:
@@ -129,7 +147,7 @@ class Person:
         if arm is None or arm.phase == "idle":
             return Gesture(person_id=self._person_id, phase="idle", gesture="none")
         gesture = arm.gesture if arm.phase == "stroke" else "none"
-        bearing = _bearing(arm, view.distance_of(face)) if gesture in POINTING else None
+        bearing = _bearing(arm, face, view) if gesture in POINTING else None
         return Gesture(
             person_id=self._person_id,
             phase=arm.phase,
@@ -139,6 +157,7 @@ class Person:
             bearing_deg=bearing.deg if bearing else None,
             bearing_sigma_deg=bearing.sigma_deg if bearing else None,
             bearing_mirrored=bearing.mirrored if bearing else False,
+            bearing_likelihood=list(bearing.likelihood) if bearing else [],
         )
 
 
@@ -152,9 +171,7 @@ def _is_joined(track: Track, hands: Sequence[Track], face: Face, config: Gesture
     )
 
 
-def _bearing(arm: Arm, distance: float) -> Bearing | None:
-    """Bearing of the arm's pointing, the person being `distance` face widths away."""
+def _bearing(arm: Arm, face: Face, view: View) -> Bearing | None:
+    """Bearing of the arm's pointing."""
     sight = arm.sight
-    if sight is None:
-        return None
-    return estimate_bearing(sight, distance, across=arm.is_across)
+    return None if sight is None else estimate_bearing(sight, view.tip_of(face, sight), arm.side)

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from deixis_runtime.lens import Lens
-from deixis_schemas.messages import Gesture, Track
+from deixis_schemas.messages import CameraMount, Gesture, Track
 from deixis_schemas.runs import RunClock
 
+from .bearing import load_arms
 from .config import GestureConfig
 from .person import Person, View
+
+LEVEL = CameraMount()
 
 
 class GestureRecognizer:
     """Follows the hands of every person. Pure: the same tracks at the same times give the same gestures."""
 
     def __init__(self, config: GestureConfig) -> None:
+        load_arms()  # now, not within the first pointing
         self._config = config
         self._persons: dict[int, Person] = {}
         self._clock = RunClock()
@@ -30,11 +34,12 @@ class GestureRecognizer:
         run: int,
         stamp_ns: int,
         room_offset_px: tuple[float, float] = (0.0, 0.0),
+        mount: CameraMount = LEVEL,
     ) -> list[Gesture]:
         """Gestures of the frame of size `width` x `height`, taken through `lens` at `stamp_ns`, in the order of `person_id`.
 
-        `room_offset_px`: how far the room has moved in the picture since the run began, for the camera moves. Another `run`
-        of the camera starts anew. Raises ValueError for an empty frame.
+        `room_offset_px`: how far the room has moved in the picture since the run began, for the camera moves; `mount`: how
+        the camera sits. Another `run` of the camera starts anew. Raises ValueError for an empty frame.
         """
         if width <= 0 or height <= 0:
             raise ValueError(f"width, height: {width} x {height}, must be positive")
@@ -45,7 +50,7 @@ class GestureRecognizer:
         self._room_offset_px = room_offset_px
         if moment.new_run:
             went_px = (0.0, 0.0)
-        time_s, view = moment.now_ns * 1e-9, View(lens, (width, height), (went_px[0], went_px[1]))
+        time_s, view = moment.now_ns * 1e-9, View(lens, (width, height), mount, (went_px[0], went_px[1]))
         of_person: dict[int, list[Track]] = {}
         for track in tracks:
             if track.person_id is not None:

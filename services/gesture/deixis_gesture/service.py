@@ -27,7 +27,7 @@ def serve(node: Node, config: GestureConfig) -> None:
         with node.step():
             through = lens.of_frame(seen.width, seen.height)
             size, offset = (seen.width, seen.height), seen.room_offset_px
-            gestures = recognizer.update(seen.tracks, *size, through, seen.run, seen.stamp_ns, offset)
+            gestures = recognizer.update(seen.tracks, *size, through, seen.run, seen.stamp_ns, offset, lens.mount)
             out.put(Gestures.derive(seen, node.producer, gestures=gestures))
 
 

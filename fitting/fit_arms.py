@@ -1,0 +1,107 @@
+"""Makes the arms by which the gesture stage reads the direction of a pointing (`deixis_gesture/arms.npz`).
+
+usage: python fitting/fit_arms.py [--arms N] [--out FILE] [--check]
+
+The simulator lets N people of its fitting avatars point all around (`deixis_simulation.pointing_arms`): where their fingertips
+are is what the stage compares a fingertip with. No picture is rendered. It takes about ten minutes on two cores. With --check
+nothing is written: a thousand arms of the people who were held out are read by the file that is there, with tips and distances
+that are measured badly, and it is said how far off and how sure bearings are: `bearing.py` has NO_ARM and its sigmas by that.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from deixis_gesture.bearing import (
+    BEARINGS,
+    FINGER_LENGTHS,
+    FINGER_SIGMA,
+    PALM_RADII,
+    PALM_SIGMA,
+    SHAPE_BEARINGS,
+    Bearing,
+    HandSight,
+    TipSight,
+    estimate_bearing,
+)
+
+OUT = Path(__file__).resolve().parents[1] / "services/gesture/deixis_gesture/arms.npz"
+PART = 250
+"""Arms of one seed; seeds below 1000 are for fitting."""
+CHECKED_SEEDS = range(1001, 1005)
+MISSED, DISTANCE_MISSED, DISTANCES = 0.2, 0.09, (6.7, 21.3)
+"""How far off tips (face widths) and distances (share) are measured; how far away people stand, face widths."""
+
+
+def main() -> int:
+    """Draw, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--arms", type=int, default=6000, help="how many (default: 6000)")
+    parser.add_argument("--out", type=Path, default=OUT, help="file to write")
+    parser.add_argument("--check", action="store_true", help="read arms of held-out people, and write nothing")
+    given = parser.parse_args()
+    if given.check:
+        check(*drawn([(seed, False) for seed in CHECKED_SEEDS]))
+        return 0
+    bearings, left, tips = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
+    np.savez_compressed(given.out, bearings_deg=bearings.astype(np.float16), left=left, tips=tips.astype(np.float16))
+    return 0
+
+
+def drawn(parts: list[tuple[int, bool]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bearings (n,) in degrees, whether it is the left arm (n,), and tips (n, 3) of these seeds' arms."""
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        bearings, left, tips = zip(*pool.map(_part, parts), strict=True)
+    return np.concatenate(bearings), np.concatenate(left), np.concatenate(tips)
+
+
+def check(bearings: np.ndarray, left: np.ndarray, tips: np.ndarray) -> None:
+    """Say how well these arms are read."""
+    rng, errors, inside = np.random.default_rng(0), [], []
+    for bearing, is_left, tip in zip(bearings, left, tips, strict=True):
+        told = np.array(_read(bearing, is_left, tip + rng.normal(0, MISSED, 3) * (1, 1, 0), rng).likelihood)
+        order = np.argsort(-told)
+        place = int(np.nonzero(order == int(np.argmin(np.abs(_wrapped(BEARINGS - bearing)))))[0][0])
+        inside.append(float(told[order][:place].sum() / told.sum()))
+        errors.append(abs(_wrapped(BEARINGS[order[0]] - bearing)))
+    print(f"{len(errors)} arms: the likeliest bearing is off by {np.median(errors):.1f} deg (median); the likeliest", end=" ")
+    print(", ".join(f"{level:.0%} hold {np.mean(np.array(inside) < level):.0%}" for level in (0.68, 0.95)))
+
+
+def _read(bearing: float, is_left: bool, tip: np.ndarray, rng: np.random.Generator) -> Bearing:
+    """What the stage makes of an arm whose person's distance is measured as badly as its hand."""
+    right, up, toward = tip
+    distance, height = rng.uniform(*DISTANCES), rng.uniform(-1, 4)
+    measured = distance * np.exp(rng.normal(0, DISTANCE_MISSED))
+    ahead = distance - toward
+    seen = TipSight(right / ahead, (height + up) / np.hypot(ahead, right), measured, height * measured / distance)
+    finger = max(0.0, np.interp(abs(bearing), SHAPE_BEARINGS, FINGER_LENGTHS) + rng.normal(0, FINGER_SIGMA))
+    palm = np.interp(abs(bearing), SHAPE_BEARINGS, PALM_RADII) + rng.normal(0, PALM_SIGMA)
+    return estimate_bearing(HandSight(0.0, 0.0, finger, palm), seen, "left" if is_left else "right")
+
+
+def _wrapped(degrees: np.ndarray) -> np.ndarray:
+    return (degrees + 180) % 360 - 180
+
+
+def _part(job: tuple[int, bool]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    from deixis_simulation.avatars import FITTING_AVATARS, HELD_OUT_AVATARS  # noqa: PLC0415 (in the process that draws)
+    from deixis_simulation.pointing_arms import pointing_arms  # noqa: PLC0415
+
+    seed, fitting = job
+    arms = list(pointing_arms(seed, FITTING_AVATARS if fitting else HELD_OUT_AVATARS, PART))
+    print(f"{PART} arms of seed {seed}", flush=True)
+    return (
+        np.array([arm.bearing_deg for arm in arms]),
+        np.array([arm.side == "left" for arm in arms]),
+        np.array([arm.tip for arm in arms]),
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
