@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.finder import RIGHT_HAND, STRIDE, Surroundings
 from deixis_tracker.frame import Step, Views, coarsened
 from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.heads import HeadColours
@@ -66,3 +67,36 @@ def test_a_region_that_is_gone_at_full_resolution_is_no_blob(person):
     background.changed(seen, np.zeros_like(changed))
     assert np.count_nonzero(views.skin) > 50
     assert hand_blobs(views, model, background, MotionHistory(room), [person], TrackerConfig()) == []
+
+
+def seen_at(x, y, odds):
+    """What the finder says that sees a right hand at a place of the picture."""
+    maps = np.full((4, 120, 160), -9.0, np.float32)
+    maps[RIGHT_HAND, y // STRIDE, x // STRIDE] = odds
+    return Surroundings(maps, 0, 0, 1.0)
+
+
+def followed(person, odds):
+    """Middle of a hand at (285, 250) beside a wall of the colour of skin, tracked while the finder has such odds."""
+    person.hands, places = [hand_at(1, "right_hand", 270, 235)], []
+    hand_and_wall = Blob(np.ones((30, 90), np.uint8), 210, 235, 2700, 1.0, 0.9)
+    tracks = HandTracks((480, 640), TrackerConfig(), count(3))
+    for k, log_odds in enumerate(odds):
+        person.around = seen_at(285, 250, log_odds)
+        now_ns = STEP.now_ns + k * STEP.passed_ns
+        tracks.update([person], [hand_and_wall], Step(now_ns, now_ns, STEP.passed_ns))
+        places.append(person.hands[0].blob.centroid[0] if person.hands and person.hands[0].blob else None)
+    return places
+
+
+def test_a_hand_that_hangs_together_with_a_wall_is_cut_out_where_the_finder_sees_it(person):
+    assert followed(person, [3.0] * 4) == pytest.approx([285] * 4, abs=12)
+
+
+def test_it_does_not_leap_while_the_finder_doubts_for_a_moment(person):
+    places = followed(person, [3.0, 3.0, 0.0, 3.0, 0.0, 3.0])
+    assert np.ptp(places) < 3
+
+
+def test_a_finder_that_never_was_sure_cuts_nothing_out(person):
+    assert followed(person, [0.7] * 3)[-1] != pytest.approx(285, abs=12)

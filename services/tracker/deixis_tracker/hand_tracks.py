@@ -10,8 +10,9 @@ import numpy as np
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND
+from deixis_tracker.found_hands import REACH
 from deixis_tracker.frame import Step
-from deixis_tracker.hands import Hand, cut_hand, thickness
+from deixis_tracker.hands import Hand, cut_hand, hand_about, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import MOST_HANDS, HandTrack, Person, is_shown
@@ -24,6 +25,10 @@ UNSEEN_SPEED_KEPT = 0.6**30  # of a hand that is not seen, per second
 EVIDENCE_KEPT = 0.995**30  # per second
 LEAST_SUPPORT = 0.15
 ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
+# A hand is cut out where the finder sees it if its log odds are so far beyond doubtful ones, and then on down to so far below,
+# for so long. Chosen among 0.4, 0.8, 0.9, never, and with or without KEPT, by `deixis eval --stage tracker --seeds 1000:1012`.
+SURELY, KEPT_ODDS, KEPT_SEEN_S = 0.4, 1.0, 0.3
+ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
 LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
 Claim = tuple[Person, HandTrack]
@@ -79,24 +84,52 @@ class HandTracks:
                 parts.append((claim, blob._replace(mask=mask, area=area)))
         return parts
 
-    def _cut(self, person: Person, blob: Blob, expected: tuple[float, float] | None, side_x: float) -> Hand | None:
+    def _cut(
+        self,
+        person: Person,
+        blob: Blob,
+        expected: tuple[float, float] | None,
+        side_x: float,
+        now_ns: int,
+        track: HandTrack | None = None,
+    ) -> Hand | None:
         shoulders = [person.shoulder(side_x)]
         if expected is None and blob.x0 < person.x < blob.x0 + blob.mask.shape[1]:
             shoulders = [person.shoulder(person.x - 1), person.shoulder(person.x + 1)]  # an arm across the body: of either side
         width, length = person.width, self._config.hand_length
         hands = [cut_hand(blob.mask, blob.x0, blob.y0, shoulder, width, length, expected) for shoulder in shoulders]
         hand = max(hands, key=lambda h: min(math.dist(h.tip, shoulder) for shoulder in shoulders))
+        hand, as_seen = self._as_seen(person, blob, hand, track, now_ns)
         least, most = self._config.min_hand_area * person.width**2, 1.6 * person.width**2
         if not least <= hand.area <= most or thickness(hand.mask) < LEAST_THICKNESS * person.width:
             return None
+        if as_seen and track is not None:
+            track.as_seen_ns = now_ns
         return hand
+
+    def _as_seen(self, person: Person, blob: Blob, hand: Hand, track: HandTrack | None, now_ns: int) -> tuple[Hand, bool]:
+        """The hand where the finder surely sees it on this blob, if that is elsewhere than the blob's end, for walls pass for
+        skin; and whether it was cut so. A track that was is cut so on, also where the finder doubts: a hand that leaps to
+        and fro is none that is held still.
+        """
+        width, kept = person.width, track is not None and now_ns - track.as_seen_ns <= KEPT_SEEN_S * 1e9
+        places = _seen_on(person, blob, self._config.hand_odds + (-KEPT_ODDS if kept else SURELY))
+        if not places:
+            return hand, False
+        expected = (track.motion.x, track.motion.y) if kept and track is not None else hand.centroid
+        place = min(places, key=lambda at: math.dist(at, expected))
+        if not (0 if kept else ELSEWHERE) * width <= math.dist(place, hand.centroid) < FAR_ELSEWHERE * width:
+            return hand, False
+        cut = hand_about(blob.mask, blob.x0, blob.y0, place, REACH * width, hand)
+        return (hand, False) if cut is None else (cut, True)
 
     def _observe(self, person: Person, track: HandTrack, blob: Blob, step: Step) -> bool:
         side = {"left_hand": 1.0, "right_hand": -1.0, "unknown": track.motion.x - person.x}[track.kind]
         # Only a raised forearm can have its hand at the end near the shoulder; and a piece of an arm that grows into the
         # whole arm may have been its elbow.
         raised = track.on_arm and track.motion.y < person.y + 2.4 * person.width
-        hand = self._cut(person, blob, (track.motion.x, track.motion.y) if raised else None, person.x + side)
+        expected = (track.motion.x, track.motion.y) if raised else None
+        hand = self._cut(person, blob, expected, person.x + side, step.now_ns, track)
         if hand is None or math.dist(hand.centroid, track.last_seen) > _reach_px(person, track, step):
             return False
         track.motion.correct(*hand.centroid, 0.06 * person.width)
@@ -118,7 +151,7 @@ class HandTracks:
         x, y = blob.x0 + blob.mask.shape[1] / 2, blob.y0 + blob.mask.shape[0] / 2
         owners = [person for person in persons if person.person_id == blob.owner]
         person = min(owners or persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
-        hand = self._cut(person, blob, None, x)
+        hand = self._cut(person, blob, None, x, step.now_ns)
         if hand is None or person.distance(*hand.centroid) > self._config.reach:
             return
         track = _lost_hand(person, hand, step)
@@ -149,6 +182,17 @@ class HandTracks:
         near = person.distance(x, y) < 1.3 * self._config.reach
         recent = step.now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9
         return near and recent and 0 <= x < width and 0 <= y < height
+
+
+def _seen_on(person: Person, blob: Blob, least: float) -> list[tuple[float, float]]:
+    """Where the finder sees hands on a blob."""
+    if person.around is None:
+        return []
+    height, width = blob.mask.shape
+    seen = [(one.x, one.y) for kind in (RIGHT_HAND, LEFT_HAND) for one in person.around.hands(kind, least)]
+    cells = [(round(x - blob.x0), round(y - blob.y0)) for x, y in seen]
+    inside = [0 <= column < width and 0 <= row < height and bool(blob.mask[row, column]) for column, row in cells]
+    return [place for place, on_blob in zip(seen, inside, strict=True) if on_blob]
 
 
 def _one_per_arm(claims: list[int], tracks: list[Claim]) -> list[int]:

@@ -90,6 +90,19 @@ def cut_hand(
     return _measured(hand, x0, y0, (x0 + tip[0] / factor, y0 + tip[1] / factor), whole / factor)
 
 
+def hand_about(mask: Mask, x0: int, y0: int, place: tuple[float, float], reach_px: float, like: Hand) -> Hand | None:
+    """What of a blob lies within `reach_px` of a place, if anything does; its tip is what is nearest to that of `like`."""
+    rows, columns = np.nonzero(mask)
+    near = np.hypot(columns + x0 - place[0], rows + y0 - place[1]) <= reach_px
+    if not near.any():
+        return None
+    rows, columns = rows[near], columns[near]
+    part = np.zeros_like(mask)
+    part[rows, columns] = 1
+    k = int(np.argmin(np.hypot(columns + x0 - like.tip[0], rows + y0 - like.tip[1])))
+    return _measured(part, x0, y0, (float(x0 + columns[k]), float(y0 + rows[k])), like.arm_length_px)
+
+
 def _whole(mask: Mask, x0: int, y0: int, shoulder: tuple[float, float]) -> Hand:
     """A blob that is no longer than a hand: there is nothing to cut."""
     rows, columns = np.nonzero(mask)

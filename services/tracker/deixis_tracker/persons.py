@@ -46,6 +46,7 @@ class HandTrack:
     belief: HandBelief = field(default_factory=HandBelief)
     evidence: float = 0.0
     watched_s: float = 0.0  # time in which it was seen
+    as_seen_ns: int = -(10**18)  # when the hand was cut out last where the finder saw it
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
 
     @property
