@@ -21,15 +21,13 @@ from deixis_fusion.localisation import (
     PersonPlace,
     RobotPlace,
     bearing_deg,
-    bearing_with_sigma_deg,
     depth_of_face,
     locate,
 )
-from deixis_fusion.visibility import frame_of_discernment, sees
 from deixis_runtime.lens import LensError
 from deixis_runtime.mount import to_base
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Poi, Track
+from deixis_schemas.messages import CameraInfo, CameraMount, HeadPose, Track
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -165,12 +163,6 @@ def test_a_place_is_held_for_a_while_when_the_face_is_not_seen() -> None:
         assert (locator.place is not None) is held
 
 
-def test_an_uncertain_distance_blurs_what_lies_to_the_side_and_not_what_lies_ahead() -> None:
-    (_, beside), (_, ahead) = (bearing_with_sigma_deg(place(2, 0), target, 0.0) for target in ((2, -1, 1), (1, 0, 1)))
-    assert beside == pytest.approx(math.degrees(math.atan(0.1)), rel=0.01)
-    assert ahead == pytest.approx(0, abs=1e-6)
-
-
 def test_a_turned_head_hardly_changes_the_distance() -> None:
     distance = DistanceFilter(0.7)
     assert distance.update(2.0, 0.0, frontal=True) == 2.0
@@ -180,41 +172,6 @@ def test_a_turned_head_hardly_changes_the_distance() -> None:
     for _ in range(90):
         frontal = distance.update(2.4, 1 / 30, frontal=True)
     assert frontal == pytest.approx(2.4, rel=0.02)
-
-
-# --- walls ------------------------------------------------------------------------------------------------------------
-
-WALL = ((1.0, -1.0), (1.0, 1.0))
-
-
-def test_a_wall_hides_what_lies_behind_it() -> None:
-    assert not sees((0, 0), (2, 0), [WALL])
-    assert sees((0, 0), (2, 3), [WALL])
-    assert sees((2, 1), (3, 0), [WALL])
-
-
-def test_a_poi_that_hangs_on_a_wall_is_seen() -> None:
-    assert sees((0, 0), (1.0, 0.2), [WALL])
-    assert sees((0, 0), (1.1, 0.0), [WALL])
-
-
-def test_a_ray_through_the_corner_of_two_walls_is_blocked() -> None:
-    assert not sees((0, 0), (2, 2), [((1, 1), (1, 3)), ((1, 1), (3, 1))])
-
-
-@given(metres, metres, metres, metres)
-def test_sight_is_mutual(ax: float, ay: float, bx: float, by: float) -> None:
-    assert sees((ax, ay), (bx, by), [WALL], 0.0) == sees((bx, by), (ax, ay), [WALL], 0.0)
-
-
-def test_the_frame_of_discernment_holds_the_visible_pois_in_their_order() -> None:
-    pois = [
-        Poi(poi_id="a", position_m=(0, 2, 1)),
-        Poi(poi_id="b", position_m=(2.5, 0, 1)),
-        Poi(poi_id="c", position_m=(0, 1, 1)),
-    ]
-    found = frame_of_discernment(place(0.5, 0), pois, [WALL], 0.15)
-    assert [candidate.poi.poi_id for candidate in found] == ["a", "c"]
 
 
 # --- the shipped clips' truth -----------------------------------------------------------------------------------------

@@ -33,7 +33,8 @@ from .localisation import Camera, PersonLocator, RobotPlace, face_of
 from .paper_rules import PaperRules
 from .report import Assessment, PersonReport, Rows, TargetReport
 from .robot_path import RobotFix, RobotPath
-from .visibility import Wall, frame_of_discernment
+from .sight import Lookout, Points
+from .visibility import Wall, Walls
 
 # An update is worth sending when the best POI's pignistic probability has changed by this.
 NOTABLE_CHANGE = 0.05
@@ -68,6 +69,7 @@ class _Person:
         self.episodes = EpisodeTracker(person_id, config.episodes)
         self.published: _Published | None = None
         self.caution = Caution()
+        self.lookout = Lookout(config.place.wall_clearance_m)
         self.seen_ns = 0
 
 
@@ -90,8 +92,8 @@ class Fusion:
         self._producer = producer
         self._rules = rules_of(config)
         self._rows = Rows(config.answer.rows)
-        self._pois: Sequence[Poi] = ()
-        self._walls: Sequence[Wall] = ()
+        self._points = Points.of(())
+        self._walls = Walls(())
         self._camera: Camera | None = None
         self._clock = RunClock()
         self._followed: dict[int, _Person] = {}
@@ -102,11 +104,11 @@ class Fusion:
 
     def set_pois(self, pois: Sequence[Poi]) -> None:
         """The POIs that may be meant from now on."""
-        self._pois = sorted(pois, key=lambda poi: poi.poi_id)
+        self._points = Points.of(sorted(pois, key=lambda poi: poi.poi_id))
 
     def set_walls(self, walls: Sequence[Wall]) -> None:
         """What nobody sees through: segments in the map frame, metres."""
-        self._walls = tuple(walls)
+        self._walls = Walls(walls)
 
     def set_camera(self, info: CameraInfo) -> str | None:
         """How the camera projects, and where it is mounted. Returns why persons cannot be placed, if so."""
@@ -205,11 +207,11 @@ class Fusion:
     def _assess(self, person: _Person, evidence: Evidence, moment: _Moment) -> Assessment:
         place, judgement = person.locator.place, None
         if place is not None:
-            seen = frame_of_discernment(place, self._pois, self._walls, self._config.place.wall_clearance_m)
-            judgement = decide(seen, evidence, self._rules, self._config.answer.max_unknown) if seen else None
+            seen = person.lookout.look(place, self._points, self._walls)
+            judgement = decide(seen, evidence, self._rules, self._config.answer.max_unknown) if len(seen) else None
         if judgement is not None:
             judgement = person.caution.judged(judgement, evidence)
-        return Assessment(place, evidence, judgement, self._pois, moment.robot.doubt)
+        return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt)
 
     def _final(self, person: _Person, ended: Stroke | None, moment: _Moment, now_ns: int | None) -> list[Target]:
         if ended is None:

@@ -85,18 +85,6 @@ def bearing_deg(place: PersonPlace, target_m: Vector) -> float:
     return math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
-def bearing_with_sigma_deg(place: PersonPlace, target_m: Vector, extent_m: float) -> tuple[float, float]:
-    """That bearing, and its standard deviation from the person's distance and the POI's extent, degrees, at most 60.
-
-    The person's place is uncertain along the line to the camera: that moves the bearing of what lies to the side.
-    """
-    bearing = bearing_deg(place, target_m)
-    away = max(math.dist(place.position_m[:2], target_m[:2]), 0.05)
-    across = place.sigma_m * math.sin(math.radians(bearing))
-    spread = math.hypot(across, extent_m / math.sqrt(12))
-    return bearing, min(60.0, math.degrees(math.atan2(spread, away)))
-
-
 def wrapped_deg(angle: float) -> float:
     """The same angle within -180 and 180 degrees."""
     return (angle + 180.0) % 360.0 - 180.0
