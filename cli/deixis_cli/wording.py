@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from deixis_schemas.messages import Belief, Gesture, Gestures, HeadPose, HeadPoses, PersonBelief, Target, Tracks
+from deixis_schemas.messages import Belief, Gesture, Gestures, HeadPose, HeadPoses, PersonBelief, PoiBelief, Target, Tracks
 
 Names = Mapping[str, str]
 
@@ -52,9 +52,10 @@ def target_line(target: Target, names: Names) -> str:
     """A target in one line."""
     standing = {poi.poi_id: poi for poi in target.pois}
     first = standing.get(target.poi_ids[0]) if target.poi_ids else None
-    figures = f"belief {first.belief:.2f}, pignistic {first.pignistic:.2f}, " if first else ""
+    figures = f"probability {chance(first):.2f}, belief {first.belief:.2f}, " if first else ""
+    figures += f"contour conflict {target.contour_conflict:.2f}"
     kind = "ANSWER" if target.final else "target"
-    return f"{kind} person {target.person_id}: {answer(target, names)} ({figures}conflict {target.conflict:.2f})"
+    return f"{kind} person {target.person_id}: {answer(target, names)} ({figures})"
 
 
 def answer_text(target: Target, names: Names) -> str:
@@ -65,9 +66,14 @@ def answer_text(target: Target, names: Names) -> str:
         if poi_id in standing:
             poi = standing[poi_id]
             lines.append(
-                f"  {poi_id}: belief {poi.belief:.3f}, plausibility {poi.plausibility:.3f}, pignistic {poi.pignistic:.3f}"
+                f"  {poi_id}: probability {chance(poi):.3f}, belief {poi.belief:.3f}, plausibility {poi.plausibility:.3f}"
             )
-    return "\n".join([*lines, f"  conflict {target.conflict:.3f}", f"  {target.reason}"])
+    return "\n".join([*lines, f"  contour conflict {target.contour_conflict:.3f}", f"  {target.reason}"])
+
+
+def chance(poi: PoiBelief) -> float:
+    """How probable it is that the POI is meant: what fusion says, or of others that do not say it the pignistic probability."""
+    return poi.pignistic if poi.probability is None else poi.probability
 
 
 def titled(poi_id: str, names: Names) -> str:
@@ -95,7 +101,7 @@ def _gesture(gesture: Gesture) -> str:
 def _person(person: PersonBelief, names: Names) -> str:
     if not person.pois:
         return "no POIs"
-    top = max(person.pois, key=lambda poi: poi.pignistic)
+    top = max(person.pois, key=chance)
     if person.unknown > 0.999:
         return "open"
-    return f"{titled(top.poi_id, names)} {top.pignistic:.2f}"
+    return f"{titled(top.poi_id, names)} {chance(top):.2f}"

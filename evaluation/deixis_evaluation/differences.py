@@ -77,6 +77,7 @@ TOLERANCES = (
     Tolerance("fusion", "unknown", _apart, 0.03, 0.03),
     Tolerance("fusion", "conflict", _apart, 0.03, 0.03),
     Tolerance("fusion", "pignistic", _apart, 0.03, 0.03),
+    Tolerance("fusion", "probability", _apart, 0.03, 0.03),
     Tolerance("fusion", "evidence_weight", _apart, 0.03, 0.03),
     Tolerance("fusion", "answers", _equal, 0, 0),
     Tolerance("fusion", "answer_from_to_s", _apart, 0.15, 0),

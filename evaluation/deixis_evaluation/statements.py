@@ -107,6 +107,12 @@ def _say_belief(message: Belief) -> Stated:
         "unknown": {name: person.unknown for name, person in persons.items()},
         "conflict": {name: person.conflict for name, person in persons.items()},
         "pignistic": {f"{poi.poi_id} of {name}": poi.pignistic for name, person in persons.items() for poi in person.pois},
+        "probability": {
+            f"{poi.poi_id} of {name}": poi.probability
+            for name, person in persons.items()
+            for poi in person.pois
+            if poi.probability is not None
+        },
         "evidence_weight": {
             f"{item.source} of {name}": item.weight for name, person in persons.items() for item in person.evidence
         },

@@ -353,6 +353,10 @@ class PoiBelief(Part):
     belief: Share
     plausibility: Share
     pignistic: Share
+    probability: Share | None = Field(
+        default=None,
+        description="How probable it is that this one is meant: by this POIs are ranked and answered. None where not told.",
+    )
     bearing_deg: Degree | None = Field(default=None, description="Its bearing at the person.")
 
 
@@ -376,6 +380,10 @@ class Evidence(Part):
     masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_LISTED, description="The sets of largest mass.")
 
 
+CREDIBLE = (
+    "The fewest POIs, the likeliest first, among which the one meant is with a probability of 0.9 (setting `answer.credible`); "
+    "the first of them."
+)
 CONTOUR_CONFLICT = (
     "1 - max over POIs of the product of hand's and head's likelihoods, each divided by its largest: 0 where both fit one POI, "
     "near 1 where they contradict each other, at any number of POIs."
@@ -395,6 +403,8 @@ class PersonBelief(Part):
     unknown: Share = Field(default=1.0, description="Mass of the whole frame of discernment: what is not known.")
     conflict: Share = Field(default=0.0, description="Mass that Dempster's rule divides away, 1 - K.")
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
+    credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
+    credible_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
 
@@ -417,6 +427,8 @@ class Target(OfFrame):
     pois_total: Count = Field(default=0, description="How many POIs came into question.")
     conflict: Share = Field(description="Mass that Dempster's rule divides away, 1 - K.")
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
+    credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
+    credible_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     reason: Text
     started_ns: Nanoseconds

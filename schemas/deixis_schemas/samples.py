@@ -34,8 +34,8 @@ _EVIDENCE = [
     m.Evidence(source="headpose", status="dead", observed="nothing: the stage is silent", weight=0.0),
 ]
 _POIS = [
-    m.PoiBelief(poi_id="vase", mass=0.9, belief=0.9, plausibility=1.0, pignistic=0.95, bearing_deg=61.5),
-    m.PoiBelief(poi_id="door", mass=0.0, belief=0.0, plausibility=0.1, pignistic=0.05, bearing_deg=-170.0),
+    m.PoiBelief(poi_id="vase", mass=0.9, belief=0.9, plausibility=1.0, pignistic=0.95, probability=0.97, bearing_deg=61.5),
+    m.PoiBelief(poi_id="door", mass=0.0, belief=0.0, plausibility=0.1, pignistic=0.05, probability=0.03, bearing_deg=-170.0),
 ]
 _TARGET = m.Target.derive(
     FRAME,
@@ -47,6 +47,8 @@ _TARGET = m.Target.derive(
     pois=_POIS,
     pois_total=2,
     conflict=0.0,
+    credible=["vase"],
+    credible_total=1,
     evidence=_EVIDENCE,
     reason="points to the left; only the vase lies there",
     started_ns=STAMP_NS - 1_500_000_000,
@@ -61,6 +63,8 @@ _PERSON = m.PersonBelief(
     pois_total=2,
     unknown=0.1,
     conflict=0.0,
+    credible=["vase"],
+    credible_total=1,
     evidence=_EVIDENCE,
     episode_id="edge-4-1",
 )

@@ -68,7 +68,7 @@ def test_the_json_document_can_be_read_and_holds_the_answers():
 
 def test_a_target_without_an_answer_says_so():
     assert "no answer" in target_line(TARGET.model_copy(update={"poi_ids": []}), NAMES)
-    assert "the blue vase (vase) (belief 0.90" in target_line(TARGET, NAMES)
+    assert "the blue vase (vase) (probability 0.97, belief 0.90" in target_line(TARGET, NAMES)
 
 
 def test_a_line_tells_what_each_stage_sees():
@@ -82,7 +82,7 @@ def test_a_line_tells_what_each_stage_sees():
         "+58±4°",
         "out of range right",
         "stroke point_left +62±15°",
-        "the blue vase (vase) 0.95",
+        "the blue vase (vase) 0.97",
         "without headpose",
     ):
         assert part in line

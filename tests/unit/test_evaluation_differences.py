@@ -30,8 +30,15 @@ def gestures(seq: int, **changes: Any) -> Gestures:
     return Gestures.model_validate({**head(seq), "gestures": [gesture | {"bearing_sigma_deg": 8} | changes]})
 
 
-def belief(seq: int, pignistic: float = 0.8) -> Belief:
-    poi = {"poi_id": "P3", "mass": 0.7, "belief": 0.7, "plausibility": 0.9, "pignistic": pignistic}
+def belief(seq: int, pignistic: float = 0.8, probability: float = 0.9) -> Belief:
+    poi = {
+        "poi_id": "P3",
+        "mass": 0.7,
+        "belief": 0.7,
+        "plausibility": 0.9,
+        "pignistic": pignistic,
+        "probability": probability,
+    }
     return Belief.model_validate({**head(seq), "persons": [{"person_id": 0, "distance_m": 2.0, "unknown": 0.1, "pois": [poi]}]})
 
 
@@ -73,6 +80,7 @@ def test_equal_answers_differ_in_nothing(stage: str, make: Callable[..., OfFrame
         ("gesture", gestures, {"hand": "right"}, "hand"),
         ("gesture", gestures, {"bearing_deg": 64}, "bearing_deg"),
         ("fusion", belief, {"pignistic": 0.76}, "pignistic"),
+        ("fusion", belief, {"probability": 0.86}, "probability"),
     ],
 )
 def test_each_field_has_a_limit(stage: str, make: Callable[..., OfFrame], changes: dict[str, Any], field: str) -> None:

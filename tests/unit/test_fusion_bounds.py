@@ -6,16 +6,19 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from deixis_fusion.belief import BeliefAssignment, Combination, normalised, vacuous
+from deixis_fusion.assessment import Assessment
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.decision import Choice, Judgement
 from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Witness
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.joining import JoinedFrame
+from deixis_fusion.mass_vector import Combined, MassVector
 from deixis_fusion.poi_edits import PoiEdits
+from deixis_fusion.reasons import explain
 from deixis_fusion.registry import Registry
-from deixis_fusion.report import Assessment, PersonReport, Rows, TargetReport, explain
+from deixis_fusion.report import PersonReport, Rows, TargetReport
 from deixis_fusion.state import Asked, Standing, state_of
 from deixis_fusion.visibility import Candidate
 from deixis_runtime.queries import Refused
@@ -100,7 +103,7 @@ def test_a_poi_with_the_longest_name_does_not_end_the_stage_when_it_is_pointed_a
 
 @pytest.mark.parametrize("rules", ["paper", "deixis"])
 def test_belief_and_target_stay_below_a_mebibyte_with_all_pois_and_all_persons(rules: str) -> None:
-    fusion = core(many(), rules=rules, answer={"rows": 64, "max_ties": 64, "tie_margin": 1.0})
+    fusion = core(many(), rules=rules, answer={"rows": 64, "max_ties": 64, "tie_ratio": 1e-6})
     beliefs, targets = point(fusion, MAX_PERSONS)
     targets += fusion.end(None)
     assert len(beliefs[-1].persons) == MAX_PERSONS
@@ -116,9 +119,10 @@ def candidates(count: int) -> list[Candidate]:
 def largest(observed: str) -> Assessment:
     """All sets large, all POIs named, every text as long as it comes."""
     seen = candidates(MAX_POIS)
-    sets = normalised(MAX_POIS, {(1 << MAX_POIS) - 1 - (1 << i): 1.0 for i in range(16)})
+    all_but_one = [(np.arange(MAX_POIS) != i, 1.0) for i in range(16)]
+    sets, chances = MassVector.normalised(np.zeros(MAX_POIS), all_but_one), np.full(MAX_POIS, 1 / MAX_POIS)
     said = Witness("ok", observed, "p" * 129)
-    judgement = Judgement(seen, sets, sets, Combination(sets, 0.9), Choice(tuple(range(MAX_POIS))))
+    judgement = Judgement(seen, sets, sets, Combined(sets, 0.9), chances, Choice(tuple(range(MAX_POIS))))
     return Assessment(None, Evidence(HandObservation("invisible"), said, HeadObservation(None), said), judgement, (), "d" * 300)
 
 
@@ -143,7 +147,7 @@ def test_messages_hold_the_likeliest_pois_best_first_and_say_how_many_there_were
     (final,) = fusion.end(None)
     for told in (beliefs[-1].persons[0], final):
         assert (len(told.pois), told.pois_total) == (16, 100)
-        chances = [row.pignistic for row in told.pois]
+        chances = [row.probability or 0 for row in told.pois]
         assert chances == sorted(chances, reverse=True)
         assert chances[0] > 1 / 100
 
@@ -164,10 +168,10 @@ def test_a_set_tells_its_size_and_its_first_members() -> None:
 
 
 def test_an_abstention_is_explained_whatever_abstains() -> None:
-    seen, nothing = candidates(2), vacuous(2)
+    seen, nothing = candidates(2), MassVector.vacuous(2)
     choice = Choice((), "why " * 2000)
     said = Witness("ok", "")
-    judgement = Judgement(seen, nothing, nothing, Combination(BeliefAssignment(2, {3: 1.0}), 0.0), choice)
+    judgement = Judgement(seen, nothing, nothing, Combined(nothing, 0.0), np.full(2, 0.5), choice)
     assert len(explain(Assessment(None, Evidence(None, said, None, said), judgement, ()))) == 2000
 
 

@@ -9,9 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from .belief import Combination
+import numpy as np
+import numpy.typing as npt
+
 from .decision import Choice, Judgement
 from .evidence import Evidence
+from .mass_vector import Combined
+
+Values = npt.NDArray[np.float64]
 
 GONE = ("dead", "late", "wrong_version")
 WHY = "a stage that spoke for more than one POI is gone"
@@ -19,10 +24,13 @@ WHY = "a stage that spoke for more than one POI is gone"
 
 @dataclass(frozen=True)
 class _Heard:
-    """The last judgement with all the stages that had spoken: their names, how sure it was, and what it answered."""
+    """The last judgement with all the stages that had spoken: their names, how sure it was (the chance of the likeliest POI and
+    its pignistic probability), and what it answered.
+    """
 
     stages: frozenset[str]
-    best: float
+    chance: float
+    pignistic: float
     poi_ids: frozenset[str]
 
 
@@ -42,7 +50,9 @@ class Caution:
         heard = self._heard
         if heard is not None and any(name in heard.stages and _is_gone(evidence, name) for name in ("gesture", "headpose")):
             return _no_surer(judgement, heard)
-        self._heard = _Heard(speaking, max(judgement.pignistic), frozenset(judgement.poi_ids))
+        self._heard = _Heard(
+            speaking, float(judgement.chances.max()), float(judgement.pignistic.max()), frozenset(judgement.poi_ids)
+        )
         return judgement
 
 
@@ -56,18 +66,32 @@ def _is_gone(evidence: Evidence, name: str) -> bool:
 
 
 def _no_surer(judgement: Judgement, heard: _Heard) -> Judgement:
-    """Discounted until no POI is likelier than the likeliest was (pignistic probabilities go linearly toward 1 / n)."""
-    best, even = max(judgement.pignistic), 1 / len(judgement.seen)
-    if best > heard.best and best > even:
-        rate = min(1.0, (best - heard.best) / (best - even))
-        belief = judgement.combination.belief.discounted(rate)
-        judgement = replace(judgement, combination=Combination(belief, judgement.combination.conflict))
+    """Chances mixed with equal ones, and masses discounted, until none is larger than the largest was.
+
+    Both go linearly toward 1 / n. All that was answered before, still is.
+    """
+    even = 1 / len(judgement.seen)
+    rate = _rate(judgement.chances, heard.chance)
+    chances = (1 - rate) * judgement.chances + rate * even
+    belief = judgement.combination.belief.discounted(_rate(judgement.pignistic, heard.pignistic))
+    weakened = replace(judgement, chances=chances, combination=Combined(belief, judgement.combination.conflict))
+    return replace(weakened, choice=_no_narrower(weakened, heard))
+
+
+def _rate(shares: Values, most: float) -> float:
+    """How much of the shares must be made equal for none to be larger than `most`."""
+    best, even = float(shares.max()), 1 / len(shares)
+    return min(1.0, (best - most) / (best - even)) if best > most and best > even else 0.0
+
+
+def _no_narrower(judgement: Judgement, heard: _Heard) -> Choice:
+    """The answer with all POIs in it that were tied before; none where there was none."""
     answered = frozenset(judgement.poi_ids)
-    if answered < heard.poi_ids or (answered and not heard.poi_ids):
-        again = [i for i in _by_certainty(judgement) if judgement.seen[i].poi.poi_id in heard.poi_ids]
-        judgement = replace(judgement, choice=Choice(tuple(again), "" if again else WHY))
-    return judgement
-
-
-def _by_certainty(judgement: Judgement) -> list[int]:
-    return sorted(range(len(judgement.seen)), key=lambda i: (-judgement.pignistic[i], i))
+    if not answered:
+        return judgement.choice
+    if not heard.poi_ids:
+        return Choice((), WHY)
+    if answered >= heard.poi_ids:
+        return judgement.choice
+    both = answered | heard.poi_ids
+    return Choice(tuple(int(i) for i in np.argsort(-judgement.chances, kind="stable") if judgement.seen[i].poi.poi_id in both))

@@ -1,4 +1,4 @@
-"""Deciding: the masses of hand and head by the rules, combined by Dempster's rule (eqs 11-15), and the answer chosen."""
+"""Deciding: what the rules make of hand and head, and the answer chosen."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from .belief import BeliefAssignment, Combination, combine, vacuous
 from .evidence import Evidence, HandObservation, HeadObservation
+from .mass_vector import Combined, MassVector
 from .visibility import Candidate
+
+Values = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,8 +26,55 @@ class Choice:
     abstains: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The POIs in question, the assignment of each source, both combined, and the answer.
+
+    `chances` is the probability of each POI, by which they are ranked.
+    """
+
+    seen: Sequence[Candidate]
+    hand: MassVector
+    head: MassVector
+    combination: Combined
+    chances: Values
+    choice: Choice
+    contour_conflict: float = 0.0
+    credible_share: float = 0.9
+
+    @cached_property
+    def credible(self) -> tuple[int, ...]:
+        """The fewest hypotheses, best first, among which the POI meant is with a probability of `credible_share`."""
+        order = np.argsort(-self.chances, kind="stable")
+        needed = int(np.searchsorted(np.cumsum(self.chances[order]), self.credible_share * (1 - 1e-12))) + 1
+        return tuple(int(i) for i in order[:needed])
+
+    @cached_property
+    def pignistic(self) -> Values:
+        """Pignistic probability of each POI, by the masses."""
+        return self.combination.belief.pignistic()
+
+    @cached_property
+    def plausibilities(self) -> Values:
+        """Plausibility of each POI, by the masses."""
+        return self.combination.belief.plausibilities()
+
+    @property
+    def poi_ids(self) -> tuple[str, ...]:
+        """The answer, best first."""
+        return tuple(self.seen[i].poi.poi_id for i in self.choice.hypotheses)
+
+
 class Rules(Protocol):
-    """How observations become basic belief assignments over the POIs seen, and a combined belief an answer."""
+    """How observations become an answer."""
+
+    def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
+        """What to think of the POIs that are seen (one at least)."""
+        ...
+
+
+class MassRules(Protocol):
+    """Rules that answer by the combined masses alone."""
 
     def hand(self, hand: HandObservation, seen: Sequence[Candidate]) -> BeliefAssignment:
         """The assignment of a pointing hand; `seen` is not empty."""
@@ -41,28 +94,21 @@ class Rules(Protocol):
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """The POIs in question, the assignment of each source, both combined, and the answer."""
+class ByMasses:
+    """Rules by masses, with what all share: a source that observed nothing is vacuous, and chances are pignistic."""
 
-    seen: Sequence[Candidate]
-    hand: BeliefAssignment
-    head: BeliefAssignment
-    combination: Combination
-    choice: Choice
-    contour_conflict: float = 0.0
+    rules: MassRules
+    max_unknown: float
+    credible: float
 
-    @cached_property
-    def pignistic(self) -> list[float]:
-        """Pignistic probability of each POI."""
-        return self.combination.belief.pignistic()
-
-    @property
-    def poi_ids(self) -> tuple[str, ...]:
-        """The answer, best first."""
-        return tuple(self.seen[i].poi.poi_id for i in self.choice.hypotheses)
+    def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
+        """Weigh and combine."""
+        return decide(seen, evidence, self.rules, self.max_unknown, self.credible)
 
 
-def decide(seen: Sequence[Candidate], evidence: Evidence, rules: Rules, max_unknown: float) -> Judgement:
+def decide(
+    seen: Sequence[Candidate], evidence: Evidence, rules: MassRules, max_unknown: float, credible: float = 0.9
+) -> Judgement:
     """Weigh and combine; a source that observed nothing is vacuous. With more than `max_unknown` on the whole frame, abstain.
 
     Of a single POI the whole frame is all there is: there it counts whether anything was observed.
@@ -77,4 +123,14 @@ def decide(seen: Sequence[Candidate], evidence: Evidence, rules: Rules, max_unkn
         choice = Choice((), "nothing was observed that tells the POIs apart")
     else:
         choice = rules.choose(combination, evidence, seen)
-    return Judgement(seen, hand, head, combination, choice, rules.contour_conflict(evidence, seen))
+    chances = np.array(combination.belief.pignistic())
+    return Judgement(
+        seen=seen,
+        hand=MassVector.of(hand),
+        head=MassVector.of(head),
+        combination=Combined.of(combination),
+        chances=chances,
+        choice=choice,
+        contour_conflict=rules.contour_conflict(evidence, seen),
+        credible_share=credible,
+    )

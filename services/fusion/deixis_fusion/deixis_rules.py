@@ -1,7 +1,9 @@
-"""Our rules, beyond the paper's: every POI is weighed by the likelihood of what was seen given its bearing (`likelihood.py`).
+"""Our rules, beyond the paper's: the answer by a product of likelihoods, and masses that explain it.
 
-The head turns only part of the way, and part of the mass stays on the sets of eq. 16 and on the whole frame, so that one
-wrong source is never a total conflict. Bearings are degrees at the person, positive toward the person's own left.
+Every POI is weighed by the likelihood of what was seen given its bearing (`curves.py`, `weighing.py`). The answer follows from
+the product of both sources alone: the odds of two POIs then depend on these two, not on how many others there are. The masses
+of each source, and both by Dempster's rule, go with it; they decide nothing here. Bearings are degrees at the person, positive
+toward the person's own left.
 """
 
 from __future__ import annotations
@@ -9,24 +11,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .belief import BeliefAssignment, Combination, as_set, everything_of, normalised, vacuous
-from .config import AnswerConfig, HandConfig, HeadConfig
-from .decision import Choice
-from .evidence import Evidence, HandObservation, HeadObservation
-from .likelihood import (
-    LEAST_OUT_OF_RANGE,
-    contour_conflict,
-    fit,
-    hand_likelihoods,
-    head_likelihoods,
-    head_tells_nothing,
-    out_of_range_likelihoods,
-    yaw_likelihoods,
-)
-from .paper_rules import gesture_sets
-from .visibility import Candidate
+import numpy as np
+import numpy.typing as npt
 
+from .config import AnswerConfig, HandConfig, HeadConfig
+from .decision import Choice, Judgement
+from .evidence import Evidence, HandObservation, HeadObservation
+from .mass_vector import MassVector, combine
+from .paper_rules import TABLE_1
+from .sight import Sight
+from .visibility import Candidate
+from .weighing import Weighing, weigh
+
+Values = npt.NDArray[np.float64]
 POSSIBILITY_LEVELS = 5
+# A source whose likelihoods differ by less than this part of the largest tells nothing.
+TOLD = 0.1
+NOTHING_TOLD = "nothing was observed that tells the POIs apart"
 
 
 @dataclass(frozen=True)
@@ -37,114 +38,100 @@ class DeixisRules:
     head_config: HeadConfig
     answer: AnswerConfig
 
-    def hand(self, hand: HandObservation, seen: Sequence[Candidate]) -> BeliefAssignment:
-        """Eq. 16 refined by the hand's bearing."""
-        return hand_assignment(hand, seen, self.hand_config)
+    def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
+        """Weigh, and answer. `seen` is not empty."""
+        sight = Sight.of(seen)
+        weighed = weigh(evidence, sight, self.hand_config, self.head_config)
+        hand, head = MassVector.vacuous(len(sight)), MassVector.vacuous(len(sight))
+        if evidence.hand is not None:
+            hand = hand_masses(evidence.hand, weighed.hand, sight, self.hand_config)
+        if evidence.head is not None:
+            head = head_masses(evidence.head, weighed.head, weighed.head_floor, self.head_config)
+        chances = weighed.chances(self.answer.tempering)
+        choice = self.choose(weighed, chances, evidence)
+        combined, conflict = combine(hand, head), weighed.contour_conflict
+        return Judgement(sight, hand, head, combined, chances, choice, conflict, self.answer.credible)
 
-    def head(self, head: HeadObservation, seen: Sequence[Candidate]) -> BeliefAssignment:
-        """Eq. 18 with a head that turns part of the way."""
-        return head_assignment(head, seen, self.head_config)
-
-    def contour_conflict(self, evidence: Evidence, seen: Sequence[Candidate]) -> float:
-        """How much hand and head contradict each other, 0 to 1; 0 where one of them says nothing."""
-        if evidence.hand is None or evidence.head is None:
-            return 0.0
-        hand = hand_likelihoods(evidence.hand, seen, self.hand_config)
-        return contour_conflict(hand, head_likelihoods(evidence.head, seen, self.head_config))
-
-    def choose(self, combination: Combination, evidence: Evidence, seen: Sequence[Candidate]) -> Choice:
-        """The POIs of largest pignistic probability, unless hand and head contradict each other or too many are tied."""
-        conflict = self.contour_conflict(evidence, seen)
-        if conflict > self.answer.max_conflict:
+    def choose(self, weighed: Weighing, chances: Values, evidence: Evidence) -> Choice:
+        """The likeliest POIs, unless nothing was told, hand and head contradict each other, or no POI fits, or too many do."""
+        answer, conflict = self.answer, weighed.contour_conflict
+        tied = likeliest(chances, answer.tie_ratio)
+        if conflict > answer.max_conflict:
             return Choice((), f"hand and head contradict each other (contour conflict {conflict:.3f})")
-        tied = best_by_pignistic(combination.belief, self.answer.tie_margin)
-        if len(tied) > self.answer.max_ties:
-            return Choice((), f"{len(tied)} POIs are equally likely")
-        if len(seen) == 1 and self.fit(evidence, seen[0]) < self.answer.least_fit:
-            return Choice((), "the only POI in sight does not lie where hand and head point")
+        if weighed.fit[tied[0]] < answer.least_fit:
+            which = "the only POI in sight does not lie" if len(chances) == 1 else "no POI in sight lies"
+            return Choice((), f"{which} where hand and head point")
+        if not (_tells(weighed.hand, evidence.hand) or _tells(weighed.head, evidence.head)):
+            return Choice((), NOTHING_TOLD)
+        if len(tied) > answer.max_ties:
+            return Choice((), f"{len(tied)} POIs are too near each other to be told apart")
         return Choice(tied)
 
-    def fit(self, evidence: Evidence, candidate: Candidate) -> float:
-        """How well a POI explains hand and head, beside others that might hang anywhere: a lone one is never contradicted."""
-        hand, head = evidence.hand, evidence.head
-        of_hand = fit(lambda seen: hand_likelihoods(hand, seen, self.hand_config), candidate) if hand else 1.0
-        return of_hand * (fit(lambda seen: head_likelihoods(head, seen, self.head_config), candidate) if head else 1.0)
+
+def likeliest(chances: Values, tie_ratio: float) -> tuple[int, ...]:
+    """The hypotheses that are at least `tie_ratio` times as likely as the likeliest, best first."""
+    tied = np.flatnonzero(chances >= tie_ratio * chances.max())
+    return tuple(int(i) for i in tied[np.argsort(-chances[tied], kind="stable")])
 
 
-def best_by_pignistic(belief: BeliefAssignment, tie_margin: float) -> tuple[int, ...]:
-    """The hypotheses whose pignistic probability is within `tie_margin` of the largest, best first."""
-    pignistic = belief.pignistic()
-    order = sorted(range(belief.size), key=lambda i: (-pignistic[i], i))
-    return tuple(i for i in order if pignistic[order[0]] - pignistic[i] < tie_margin or i == order[0])
+def _tells(likelihoods: Values, observed: HandObservation | HeadObservation | None) -> bool:
+    """Whether a source tells POIs apart; whether a lone one is what was meant, tells how well it fits."""
+    if observed is None:
+        return False
+    return len(likelihoods) == 1 or float(likelihoods.min()) < (1 - TOLD) * float(likelihoods.max())
 
 
-# --- the hand ---------------------------------------------------------------------------------------------------------
+# --- masses, to explain by ---------------------------------------------------------------------------------------------
 
 
-def hand_assignment(hand: HandObservation, seen: Sequence[Candidate], config: HandConfig) -> BeliefAssignment:
-    """Eq. 16 refined by the bearing of the hand.
+def hand_masses(hand: HandObservation, likelihoods: Values, seen: Sight, config: HandConfig) -> MassVector:
+    """Eq. 16 refined by the bearing of the hand: its sets keep part of their mass, the rest goes to single POIs.
 
-    The sets of eq. 16 keep part of their mass. The rest goes to single POIs by P(gesture | bearing) P(hand's bearing |
-    bearing): table 1 with soft borders, times a likelihood with a tail. Without a bearing and with hard borders the single
-    masses of a region sum to its mass by eq. 16, so the refinement adds what the bearing tells and nothing else.
+    Without a bearing and with hard borders the single masses of a region sum to its mass by eq. 16, so the refinement adds
+    what the bearing tells and nothing else.
     """
-    weights = hand_likelihoods(hand, seen, config)
-    single = normalised(len(seen), {1 << i: weight for i, weight in enumerate(weights)})
-    sets = gesture_sets(hand.gesture, [candidate.bearing_deg for candidate in seen], (config.min_deg, config.max_deg))
-    return _mixed(single, sets, config.refinement).discounted(_rate(config.discount, hand.agreement))
+    single = MassVector.normalised(likelihoods)
+    return single.mixed(_regions(hand, seen.bearings.likeliest, config), config.refinement).discounted(config.discount)
 
 
-# --- the head ---------------------------------------------------------------------------------------------------------
+def _regions(hand: HandObservation, bearings: Values, config: HandConfig) -> MassVector:
+    """Eq. 16: the sets of POIs on the left, on the right and in the centre; P(G) is the share of the POIs in region G."""
+    beside = (np.abs(bearings) >= config.min_deg) & (np.abs(bearings) <= config.max_deg)
+    regions = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
+    row = TABLE_1[hand.gesture]
+    weights = [
+        (flags, row["left" if name == "left" else "right" if name == "right" else "center"] * float(flags.mean()))
+        for name, flags in regions.items()
+    ]
+    return MassVector.normalised(np.zeros(len(bearings)), weights)
 
 
-def head_assignment(head: HeadObservation, seen: Sequence[Candidate], config: HeadConfig) -> BeliefAssignment:
+def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config: HeadConfig) -> MassVector:
     """Eq. 18 with a head that turns only part of the way; beyond its range, mass on the POIs out there.
 
     Yaws that fit no POI, and yaws that fit a look at the robot, leave their mass on the whole frame: the head then says
-    nothing, instead of choosing the least bad POI with full confidence.
+    nothing, instead of choosing the least bad POI with full confidence. `floor` is their likelihood.
     """
-    rate = _rate(config.discount, head.agreement)
+    told = np.maximum(0.0, likelihoods - floor)
     if head.yaw_deg is None:
-        return _out_of_range(head, seen, config).discounted(rate)
-    size, told = len(seen), 1 - config.outlier - config.at_robot
-    weights = {1 << i: told / size * value for i, value in enumerate(yaw_likelihoods(head, seen, config))}
-    everything = everything_of(size)
-    weights[everything] = weights.get(everything, 0.0) + head_tells_nothing(head, config)
-    return normalised(size, weights).discounted(rate)
+        return _out_of_range(told, floor).discounted(config.discount)
+    everything = np.ones(len(likelihoods), dtype=np.bool_)
+    return MassVector.normalised(told / len(told), [(everything, floor)]).discounted(config.discount)
 
 
-def _out_of_range(head: HeadObservation, seen: Sequence[Candidate], config: HeadConfig) -> BeliefAssignment:
+def _out_of_range(possible: Values, floor: float) -> MassVector:
     """Section 6.2: the head is turned beyond its range. Nested sets, the POIs that are surely out there innermost.
 
     The less likely it is that any POI lies out there, the less is said: where none does, something else was looked at. Cut off
     at a limit instead, a POI one degree farther made the difference between knowing nothing and all.
     """
-    possible = out_of_range_likelihoods(head, seen, config)
-    most = max(possible)
+    most = float(possible.max())
     if most <= 0:
-        return vacuous(len(seen))
-    return consonant([value / most for value in possible]).discounted(LEAST_OUT_OF_RANGE / (LEAST_OUT_OF_RANGE + most))
+        return MassVector.vacuous(len(possible))
+    return consonant(possible / most).discounted(floor / (floor + most))
 
 
-def consonant(possibilities: Sequence[float]) -> BeliefAssignment:
+def consonant(possibilities: Values) -> MassVector:
     """The nested assignment whose plausibilities are these possibilities (the largest is 1), in five levels."""
-    size = len(possibilities)
-    weights: dict[int, float] = {}
-    for level in range(POSSIBILITY_LEVELS, 0, -1):
-        threshold = (level - 0.5) / POSSIBILITY_LEVELS
-        subset = as_set(i for i, value in enumerate(possibilities) if value >= threshold)
-        weights[subset] = weights.get(subset, 0.0) + 1 / POSSIBILITY_LEVELS
-    return normalised(size, weights)
-
-
-def _mixed(first: BeliefAssignment, second: BeliefAssignment, share: float) -> BeliefAssignment:
-    """`share` of the first, the rest of the second."""
-    weights = {subset: share * mass for subset, mass in first.masses.items()}
-    for subset, mass in second.masses.items():
-        weights[subset] = weights.get(subset, 0.0) + (1 - share) * mass
-    return normalised(first.size, weights)
-
-
-def _rate(discount: float, agreement: float) -> float:
-    """Discount of a source: its own, and more where the frames of a stroke disagree."""
-    return min(1.0, 1 - (1 - discount) * (0.5 + 0.5 * min(1.0, max(0.0, agreement))))
+    thresholds = (np.arange(POSSIBILITY_LEVELS, 0, -1) - 0.5) / POSSIBILITY_LEVELS
+    return MassVector.normalised(np.zeros(len(possibilities)), [(possibilities >= limit, 1.0) for limit in thresholds])

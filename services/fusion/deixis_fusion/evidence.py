@@ -17,7 +17,7 @@ from deixis_schemas.messages import BEARINGS, Gesture, HeadPose, Side, SourceSta
 
 from .config import EpisodesConfig
 from .joining import GESTURE, HEADPOSE, JoinedFrame
-from .localisation import wrapped_deg
+from .localisation import PersonPlace, wrapped_deg
 
 T = TypeVar("T")
 PointingGesture = Literal["point_left", "invisible", "point_right"]
@@ -88,15 +88,38 @@ class HandObservation:
         """The other bearing that it may be; none where there is only one."""
         return wrapped_deg(180.0 - self.bearing_deg) if self.mirrored and self.bearing_deg is not None else None
 
+    @property
+    def bearings(self) -> list[tuple[float, float]]:
+        """The bearings that it may be, each with its sigma, degrees; none where none could be told."""
+        told = (self.bearing_deg, self.mirror_deg)
+        return [(bearing, self.bearing_sigma_deg or 0.0) for bearing in told if bearing is not None]
+
 
 @dataclass(frozen=True)
 class HeadObservation:
-    """A tracked head: its yaw, or (`yaw_deg` none) that it is turned beyond the range, to `side` where that is known."""
+    """A tracked head: its yaw, or (`yaw_deg` none) that it is turned beyond the range, to `side` where that is known.
+
+    `beyond_deg` is that range, where the stage tells it.
+    """
 
     yaw_deg: float | None
     yaw_sigma_deg: float | None = None
     side: Side | None = None
     agreement: float = 1.0
+    beyond_deg: float | None = None
+
+
+class View(NamedTuple):
+    """What hand and head showed while the person stood in one place, and which share of all that each showed it is.
+
+    `place` is none where that is the place where the person stands now.
+    """
+
+    hand: HandObservation | None
+    head: HeadObservation | None
+    place: PersonPlace | None = None
+    hand_share: float = 1.0
+    head_share: float = 1.0
 
 
 class Witness(NamedTuple):
@@ -109,12 +132,16 @@ class Witness(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What hand and head of one person show, none where nothing can be told, and who says so."""
+    """What hand and head of one person show, none where nothing can be told, and who says so.
+
+    `views`: the same, from the places where it was seen; empty where that was one place.
+    """
 
     hand: HandObservation | None
     gesture: Witness
     head: HeadObservation | None
     headpose: Witness
+    views: tuple[View, ...] = ()
 
 
 def stages_of(frame: JoinedFrame, statuses: Mapping[str, StageStatus]) -> dict[str, Witness]:

@@ -22,21 +22,22 @@ from deixis_schemas.messages import (
 )
 from deixis_schemas.runs import RunClock
 
+from .assessment import Assessment
 from .caution import Caution
 from .config import FusionConfig
-from .decision import Rules, decide
+from .decision import ByMasses, Rules
 from .deixis_rules import DeixisRules
 from .episodes import EpisodeTracker, Stroke
 from .evidence import Evidence, Sample, StageStatus, Witness, gather, stages_of
 from .joining import JoinedFrame
 from .localisation import Camera, PersonLocator, RobotPlace, face_of
 from .paper_rules import PaperRules
-from .report import Assessment, PersonReport, Rows, TargetReport
+from .report import PersonReport, Rows, TargetReport
 from .robot_path import RobotFix, RobotPath
 from .sight import Lookout, Points
 from .visibility import Wall, Walls
 
-# An update is worth sending when the best POI's pignistic probability has changed by this.
+# An update is worth sending when the best POI's probability has changed by this.
 NOTABLE_CHANGE = 0.05
 KEPT_TARGETS = 16
 
@@ -76,7 +77,7 @@ class _Person:
 def rules_of(config: FusionConfig) -> Rules:
     """The rules by their setting."""
     if config.rules == "paper":
-        return PaperRules(config.paper)
+        return ByMasses(PaperRules(config.paper), config.answer.max_unknown, config.answer.credible)
     return DeixisRules(config.hand, config.head, config.answer)
 
 
@@ -208,7 +209,7 @@ class Fusion:
         place, judgement = person.locator.place, None
         if place is not None:
             seen = person.lookout.look(place, self._points, self._walls)
-            judgement = decide(seen, evidence, self._rules, self._config.answer.max_unknown) if len(seen) else None
+            judgement = self._rules.judge(seen, evidence) if len(seen) else None
         if judgement is not None:
             judgement = person.caution.judged(judgement, evidence)
         return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt)

@@ -23,8 +23,8 @@ Values = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
-# With a distance known to a tenth, the bearing of a POI 0.6 m from the person goes in steps of 4 degrees, the sigma of a head; of
-# farther ones in smaller steps.
+# With a distance known to a tenth, the bearing of a POI 0.6 m from the person goes in steps of 4 degrees, the sigma of a head;
+# that of farther ones in smaller steps.
 CASES = 15
 _SHARES = (np.arange(CASES) + 0.5) / CASES
 _QUANTILES = np.array([NormalDist().inv_cdf(share) for share in _SHARES])
