@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.episodes import EpisodeTracker, Stroke
-from deixis_fusion.evidence import Sample, hand_over, head_over, weigh
+from deixis_fusion.evidence import Sample
 from deixis_fusion.fusion import Fusion
+from deixis_fusion.hand_evidence import hand_over
+from deixis_fusion.head_evidence import head_over
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import RobotPlace
+from deixis_fusion.robust import weigh
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     Belief,

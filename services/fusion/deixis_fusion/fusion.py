@@ -28,13 +28,15 @@ from .config import FusionConfig
 from .decision import ByMasses, Rules
 from .deixis_rules import DeixisRules
 from .episodes import EpisodeTracker, Stroke
-from .evidence import Evidence, Sample, StageStatus, Witness, gather, stages_of
+from .evidence import Evidence, Sample, Witness
+from .gathering import StageStatus, gather, stages_of
 from .joining import JoinedFrame
 from .localisation import Camera, PersonLocator, RobotPlace, face_of
 from .paper_rules import PaperRules
 from .report import PersonReport, Rows, TargetReport
 from .robot_path import RobotFix, RobotPath
 from .sight import Lookout, Points
+from .views import last_place
 from .visibility import Wall, Walls
 
 # An update is worth sending when the best POI's probability has changed by this.
@@ -159,7 +161,7 @@ class Fusion:
             person = self._followed.setdefault(person_id, _Person(person_id, self._config))
             person.seen_ns = at_ns
             self._see(person, frame, poses.get(person_id), moment)
-            sample = Sample(at_ns, source.stamp_ns, gestures.get(person_id), poses.get(person_id))
+            sample = Sample(at_ns, source.stamp_ns, gestures.get(person_id), poses.get(person_id), person.locator.place)
             targets += self._follow(person, sample, moment)
         targets += self._miss(set(self._followed) - set(present), moment)
         beliefs = [report.message(self._rows) for report in self.persons]
@@ -187,7 +189,7 @@ class Fusion:
         evidence = gather(stroke.samples if stroke else (), sample, moment.stages, self._config.episodes)
         if stroke is None:
             person.caution.forget()
-        assessment = self._assess(person, evidence, moment)
+        assessment = self._assess(person, evidence, moment, stroke)
         if episode is not None and self._is_news(person, assessment, moment):
             targets.append(self._tell(person, episode, assessment, moment, moment.now_ns))
         episode_id = episode.episode_id if episode else None
@@ -205,8 +207,9 @@ class Fusion:
                 del self._followed[person_id]
         return targets
 
-    def _assess(self, person: _Person, evidence: Evidence, moment: _Moment) -> Assessment:
-        place, judgement = person.locator.place, None
+    def _assess(self, person: _Person, evidence: Evidence, moment: _Moment, stroke: Stroke | None) -> Assessment:
+        """What is thought of the person, seen from where a stroke was last seen: who points and walks off means the same."""
+        place, judgement = (last_place(stroke.samples) if stroke else None) or person.locator.place, None
         if place is not None:
             seen = person.lookout.look(place, self._points, self._walls)
             judgement = self._rules.judge(seen, evidence) if len(seen) else None
@@ -220,7 +223,7 @@ class Fusion:
         person.published = None
         latest = Sample(moment.at_ns, moment.frame.stamp_ns, None, None)
         evidence = gather(ended.samples, latest, moment.stages, self._config.episodes)
-        return [self._tell(person, ended, self._assess(person, evidence, moment), moment, now_ns, final=True)]
+        return [self._tell(person, ended, self._assess(person, evidence, moment, ended), moment, now_ns, final=True)]
 
     def _is_news(self, person: _Person, assessment: Assessment, moment: _Moment) -> bool:
         """Whether an update is due; takes note of it."""

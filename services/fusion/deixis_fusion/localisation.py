@@ -6,7 +6,7 @@ Frames by REP-103 and REP-105: optical x right, y down, z forward; `base_link` a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from deixis_runtime.lens import Lens
 from deixis_runtime.mount import Vector, to_base
@@ -58,6 +58,12 @@ class PersonPlace:
     camera_m: Vector
     distance_m: float
     sigma_m: float
+
+    @property
+    def axis_deg(self) -> float:
+        """Direction from the person to the camera, where bearings are 0: degrees counter-clockwise from the map's x axis."""
+        ahead, left = self.camera_m[0] - self.position_m[0], self.camera_m[1] - self.position_m[1]
+        return math.degrees(math.atan2(left, ahead))
 
 
 def locate(camera: Camera, robot: RobotPlace, head: HeadSighting, sigma: float) -> PersonPlace:
@@ -117,6 +123,10 @@ class PersonLocator:
             self._placed_ns = now_ns
         elif self._placed_ns is not None and now_ns - self._placed_ns > self._config.hold_s * 1e9:
             self.place = None
+        elif self.place is not None and camera is not None:
+            # The person is taken to stand still; the camera may have moved.
+            centre = _to_map(camera.mount.position_m, robot)
+            self.place = replace(self.place, camera_m=centre, distance_m=math.dist(self.place.position_m, centre))
 
     def _placed(
         self, face: Track, size: tuple[int, int], pose: HeadPose | None, camera: Camera, robot: RobotPlace, now_ns: int

@@ -1,0 +1,97 @@
+"""From the frames of a stroke, or one frame, to the evidence on a person and who says so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from deixis_schemas.messages import HeadPose, SourceStatus
+
+from .config import EpisodesConfig
+from .evidence import Evidence, HandObservation, HeadObservation, Sample, Witness
+from .hand_evidence import hand_over
+from .head_evidence import head_now, head_over
+from .joining import GESTURE, HEADPOSE, JoinedFrame
+from .robust import weigh
+from .views import last_place, views_of
+
+StageStatus = tuple[SourceStatus, str]
+
+NO_ANSWER: StageStatus = ("late", "did not answer this frame in time")
+UNKNOWN_PERSON = "the stage does not follow this person"
+
+
+def stages_of(frame: JoinedFrame, statuses: Mapping[str, StageStatus]) -> dict[str, Witness]:
+    """How headpose and gesture stand for one frame; `statuses` speaks for those that are missing in it."""
+    stages = {}
+    for stage in (HEADPOSE, GESTURE):
+        part = frame.part_of(stage)
+        if part is not None:
+            stages[stage] = Witness("ok", "", f"{part.stage}/{part.instance}")
+            continue
+        status, reason = statuses.get(stage, NO_ANSWER)
+        stages[stage] = Witness(*(NO_ANSWER if status == "ok" else (status, reason)))
+    return stages
+
+
+def gather(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witness], config: EpisodesConfig) -> Evidence:
+    """The evidence of a stroke up to the latest frame; of that frame alone where the person is in no stroke."""
+    if stroke:
+        return _of_stroke(stroke, latest, stages, config)
+    gesture, headpose = stages[GESTURE], stages[HEADPOSE]
+    head = head_now(latest.pose)
+    return Evidence(
+        hand=None,
+        gesture=_resting(latest, gesture) if gesture.status == "ok" else gesture,
+        head=head,
+        headpose=_head_witness(head, latest.pose, headpose, latest.stamp_ns) if headpose.status == "ok" else headpose,
+    )
+
+
+def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witness], config: EpisodesConfig) -> Evidence:
+    """A stage that is dead counts for nothing from then on. One that is only late counts by what it said a moment ago."""
+    gesture, headpose = stages[GESTURE], stages[HEADPOSE]
+    posed = [sample for sample in stroke if sample.pose is not None]
+    weighed, place = weigh(stroke, config.settle_s), last_place(stroke)
+    axis_deg = place.axis_deg if place is not None else None
+    hand, head = None, None
+    if _counts(gesture, stroke, latest, config):
+        hand = hand_over(weighed, axis_deg)
+        gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
+    if _counts(headpose, posed, latest, config):
+        head = head_over(weighed, axis_deg)
+        headpose = _head_witness(head, stroke[-1].pose, headpose, posed[-1].stamp_ns if posed else None)
+    return Evidence(hand, gesture, head, headpose, views_of(weighed, hand, head))
+
+
+def _counts(stage: Witness, told: Sequence[Sample], latest: Sample, config: EpisodesConfig) -> bool:
+    if stage.status == "late":
+        return bool(told) and latest.at_ns - told[-1].at_ns <= config.max_evidence_age_s * 1e9
+    return stage.status == "ok"
+
+
+def _resting(latest: Sample, stage: Witness) -> Witness:
+    if latest.gesture is None:
+        return Witness("not_tracking", UNKNOWN_PERSON, stage.producer)
+    observed = f"no pointing: {latest.gesture.phase}, {latest.gesture.gesture}"
+    return Witness("ok", observed, stage.producer, latest.stamp_ns)
+
+
+def _hand_witness(hand: HandObservation | None, stage: Witness, stamp_ns: int) -> Witness:
+    if hand is None:
+        return Witness("not_tracking", UNKNOWN_PERSON, stage.producer)
+    bearing = ""
+    if hand.bearing_deg is not None and hand.bearing_sigma_deg is not None:
+        mirror = f" or {hand.mirror_deg:.1f}" if hand.mirror_deg is not None else ""
+        bearing = f", bearing {hand.bearing_deg:.1f}{mirror} +- {hand.bearing_sigma_deg:.1f} deg"
+    return Witness(stage.status, f"{hand.gesture}{bearing}", stage.producer, stamp_ns)
+
+
+def _head_witness(head: HeadObservation | None, pose: HeadPose | None, stage: Witness, stamp_ns: int | None) -> Witness:
+    if head is None:
+        why = f"head {pose.status}" if pose is not None else UNKNOWN_PERSON
+        return Witness("not_tracking", why, stage.producer)
+    if head.yaw_deg is None:
+        side = f" to the {head.side}" if head.side else ""
+        return Witness(stage.status, f"out of range{side}", stage.producer, stamp_ns)
+    observed = f"yaw {head.yaw_deg:.1f} +- {head.yaw_sigma_deg or 0:.1f} deg"
+    return Witness(stage.status, observed, stage.producer, stamp_ns)
