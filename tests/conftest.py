@@ -6,6 +6,11 @@ import uuid
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# A busy machine makes no example wrong.
+settings.register_profile("deixis", deadline=None)
+settings.load_profile("deixis")
 
 ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"

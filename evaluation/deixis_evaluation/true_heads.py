@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from deixis_headpose.ellipsoid_head import yaw_sigma_deg
 from deixis_schemas import topics
-from deixis_schemas.messages import HeadPose, HeadPoses, Message, Tracks
+from deixis_schemas.messages import HeadPose, HeadPoses, Message, Side, Tracks
 
 from .clips import TruePerson, Truth
 from .speaker import producer_of
@@ -41,7 +41,8 @@ class TrueHeads:
         if not self._truth.in_picture(person.head.center_px):
             return HeadPose(person_id=own, status="lost")
         if abs(yaw) > RANGE_DEG:
-            return HeadPose(person_id=own, status="out_of_range", side="left" if yaw > 0 else "right")
+            side: Side = "left" if yaw > 0 else "right"
+            return HeadPose(person_id=own, status="out_of_range", side=side, beyond_deg=RANGE_DEG)
         # The sigma that the method `ellipsoid` states for a perfect match: fusion weighs the truth as it weighs a stage.
         sigma = yaw_sigma_deg(yaw, correlation=1.0, held_s=0.0)
         return HeadPose(person_id=own, status="tracking", yaw_deg=yaw, yaw_sigma_deg=sigma)

@@ -259,6 +259,11 @@ class HeadPose(Part):
         "however it is turned: how far away it is. None where the stage does not tell; then the track's box says it.",
     )
     side: Side | None = Field(default=None, description="Side the head is turned to where out of range: the person's own.")
+    beyond_deg: Annotated[float, Field(ge=0, le=180)] | None = Field(
+        default=None,
+        description="Where out of range: the yaw, to either side, beyond which this stage reads heads no more. A head that was "
+        "lost is not out of range, however it was turned.",
+    )
 
     @model_validator(mode="after")
     def _tracking_has_yaw(self) -> Self:

@@ -124,7 +124,7 @@ SAMPLES: tuple[m.Message, ...] = (
                 covariance_deg2=(16.0, -1.5, 0.5, 9.0, 0.25, 4.0),
                 face_width_px=59.5,
             ),
-            m.HeadPose(person_id=1, status="out_of_range", side="right"),
+            m.HeadPose(person_id=1, status="out_of_range", side="right", beyond_deg=130.0),
         ],
     ),
     m.Gestures.derive(

@@ -126,6 +126,14 @@ def test_one_degree_more_of_the_farthest_poi_changes_what_out_of_range_says_by_l
     assert abs(here.chances[2] - farther.chances[2]) < 0.12
 
 
+@pytest.mark.parametrize("beyond_deg", [None, 100.0])
+def test_out_of_range_does_not_outdo_a_hand_that_is_clearly_elsewhere(beyond_deg: float | None) -> None:
+    judged = judge(
+        seen(0, 50, 130), HandObservation("point_left", 50, 8), HeadObservation(None, side="left", beyond_deg=beyond_deg)
+    )
+    assert "P2" not in judged.poi_ids
+
+
 def test_a_yaw_that_is_told_is_likelier_nowhere_than_the_whole_circle_allows() -> None:
     curve = head_curve(HeadObservation(40, 3), CONFIG.head)
     assert int(BEARINGS[np.argmax(curve)]) in range(36, 44)

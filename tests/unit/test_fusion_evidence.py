@@ -69,6 +69,13 @@ def test_the_papers_head_out_of_range_means_the_pois_out_there() -> None:
     assert assignment.masses == {0b1100: pytest.approx(1.0)}
 
 
+@pytest.mark.parametrize("head", [HeadObservation(None, beyond_deg=100), HeadObservation(125, 3)])
+def test_the_papers_head_has_the_range_of_the_stage_that_read_it(head: HeadObservation) -> None:
+    limit = 110 if head.yaw_deg is None else 130
+    masses = PaperRules(PAPER.paper).head(head, seen(0, 60, limit, -limit)).masses
+    assert masses == {0b1100: pytest.approx(1.0)}
+
+
 def test_the_papers_choice_is_the_union_of_the_largest_focal_sets() -> None:
     assert largest_focal_sets(BeliefAssignment(4, {0b0011: 0.4, 0b0100: 0.4, 0b1000: 0.2})) == (0, 1, 2)
 

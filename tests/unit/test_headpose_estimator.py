@@ -108,6 +108,20 @@ def test_a_head_lost_starts_anew_where_it_is_seen_from_the_front_again() -> None
     assert found.yaw_deg == pytest.approx(0.0, abs=1.0)
 
 
+def test_a_head_lost_while_turned_far_is_lost_and_not_out_of_range() -> None:
+    estimator, noise = HeadPoseEstimator(HeadposeConfig(method="ellipsoid")), np.random.default_rng(2)
+    stamps = iter(range(0, 10**11, FRAME_NS))
+    for yaw in (0.0,) * 4 + tuple(np.arange(0.0, 92.0, 2.0)):
+        pose = turned_to(float(yaw))
+        turned = estimator.update(painted_head(pose), [face_of(pose)], LENS, 1, next(stamps))[0]
+    assert turned.status == "tracking"
+    assert (turned.yaw_deg or 0) > 85
+    unseen = face_of(pose).model_copy(update={"frontal": None})
+    for _ in range(12):
+        lost = estimator.update(noise.integers(0, 255, (240, 320), dtype=np.uint8), [unseen], LENS, 1, next(stamps))[0]
+    assert lost.status == "lost"
+
+
 @pytest.mark.parametrize("shape", [(10, 10, 4), (10,)])
 def test_a_picture_of_another_shape_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="image: needs uint8"):

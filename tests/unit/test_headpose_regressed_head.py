@@ -87,7 +87,7 @@ def test_one_look_is_enough_also_in_profile() -> None:
 
 def test_beyond_its_range_the_side_is_said() -> None:
     states = followed([a_look(150)] * 5 + [a_look(-150)] * 40)
-    assert (states[4].status, states[4].side) == ("out_of_range", "left")
+    assert (states[4].status, states[4].side, states[4].beyond_deg) == ("out_of_range", "left", HeadposeConfig().range_deg)
     assert (states[-1].status, states[-1].side) == ("out_of_range", "right")
 
 

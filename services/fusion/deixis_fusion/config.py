@@ -56,7 +56,9 @@ class HandConfig(StageConfig):
 class HeadConfig(StageConfig):
     """The `deixis` rules for the head."""
 
-    range_deg: float = Field(default=130, gt=0, le=180, description="Yaw beyond which headpose says out of range.")
+    range_deg: float = Field(
+        default=130, gt=0, le=180, description="Yaw beyond which a head is out of range, where the stage does not tell."
+    )
     range_soft_deg: float = Field(default=10, gt=0, le=90, description="Width of the border of that range.")
     sigma_deg: float = Field(default=4, gt=0, le=90, description="How exactly people turn the head.")
     gain_min: float = Field(default=0.65, gt=0, le=1.5, description="Smallest part of the way that heads turn.")
@@ -79,7 +81,9 @@ class PaperConfig(StageConfig):
 
     phi_h_min_deg: float = Field(default=40, ge=0, le=180, description="Least bearing at which a hand is recognised.")
     phi_h_max_deg: float = Field(default=140, ge=0, le=180, description="Largest bearing at which a hand is recognised.")
-    phi_f_max_deg: float = Field(default=120, gt=0, le=180, description="Largest yaw at which a head is recognised.")
+    phi_f_max_deg: float = Field(
+        default=120, gt=0, le=180, description="Largest yaw at which a head is recognised; less where the stage tells less."
+    )
     head_sigma_deg: float = Field(default=10, gt=0, le=90, description="Stands for the confusions of fig. 6.")
 
     @model_validator(mode="after")

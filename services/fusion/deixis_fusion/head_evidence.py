@@ -16,7 +16,9 @@ def head_now(pose: HeadPose | None) -> HeadObservation | None:
     """The head as one frame shows it."""
     if pose is None or pose.status not in ("tracking", "out_of_range"):
         return None
-    return HeadObservation(pose.yaw_deg if pose.status == "tracking" else None, pose.yaw_sigma_deg, pose.side)
+    if pose.status == "out_of_range":
+        return HeadObservation(None, None, pose.side, beyond_deg=pose.beyond_deg)
+    return HeadObservation(pose.yaw_deg, pose.yaw_sigma_deg, pose.side)
 
 
 def head_over(weighed: Weighed, axis_deg: float | None = None) -> HeadObservation | None:
@@ -34,7 +36,8 @@ def head_over(weighed: Weighed, axis_deg: float | None = None) -> HeadObservatio
         return None
     if beyond_share > tracked_share:
         side = majority([(pose.side, weight) for pose, weight in beyond if pose.side is not None])
-        return HeadObservation(None, None, side, beyond_share)
+        told = [(pose.beyond_deg, weight) for pose, weight in beyond if pose.beyond_deg is not None]
+        return HeadObservation(None, None, side, beyond_share, median(told) if told else None)
     yaw, spread = median_angle([((s.pose.yaw_deg or 0.0) + s.turn_to(axis_deg), w) for s, w in tracked if s.pose])
     stated = median([(s.pose.yaw_sigma_deg or 0.0, w) for s, w in tracked if s.pose])
     return HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)

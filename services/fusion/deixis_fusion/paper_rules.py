@@ -42,8 +42,10 @@ class PaperRules:
     def head(self, head: HeadObservation, seen: Sequence[Candidate]) -> BeliefAssignment:
         """Eq. 18; a normal distribution of the yaw stands for the unpublished numbers of fig. 6."""
         bearings = [candidate.bearing_deg for candidate in seen]
-        far = [abs(bearing) > self.config.phi_f_max_deg for bearing in bearings]
-        if head.yaw_deg is None:
+        # One range: that of the stage which was read, and of the rules. A yaw beyond it counts as not computed.
+        limit = min(self.config.phi_f_max_deg, head.beyond_deg or self.config.phi_f_max_deg)
+        far = [abs(bearing) > limit for bearing in bearings]
+        if head.yaw_deg is None or abs(head.yaw_deg) > limit:
             return face_assignment([1.0 if is_far else 0.0 for is_far in far], far)
         sigma = math.hypot(self.config.head_sigma_deg, head.yaw_sigma_deg or 0.0)
         likelihoods = [

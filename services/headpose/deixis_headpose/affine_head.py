@@ -192,8 +192,9 @@ class AffineHead:
         longitude, latitude, roll = (float(angle) for angle in np.degrees(chain.angles))
         if (now_ns - chain.matched_ns) * 1e-9 > self._config.hold_s:
             return HeadState("lost")
-        if abs(longitude) > min(self._config.range_deg, FARTHEST_DEG):
-            return HeadState("out_of_range", side=side_of(longitude))
+        beyond_deg = min(self._config.range_deg, FARTHEST_DEG)
+        if abs(longitude) > beyond_deg:
+            return HeadState("out_of_range", side=side_of(longitude), beyond_deg=beyond_deg)
         return HeadState("tracking", (longitude, -latitude, roll), self._sigma_deg(chain, now_ns))
 
     def _sigma_deg(self, chain: Chain, now_ns: int) -> float:

@@ -51,7 +51,6 @@ class HeadposeConfig(StageConfig):
         le=180,
         description="Yaw beyond which the head is out of range, degrees; 100 at most but for `regression`.",
     )
-    turned_deg: float = Field(default=85.0, gt=10, le=90, description="A head lost when turned beyond this is out of range.")
     doubt_deg: float = Field(
         default=80.0, gt=20, le=120, description="Beyond this yaw, and where lost, a frontal face that is seen starts it anew."
     )

@@ -157,25 +157,25 @@ class EllipsoidHead:
             self._keyframes.add(take_keyframe(levels, self._surface, found.pose, sight.camera))
 
     def _hold(self, dt: float) -> HeadState:
-        """Below the gate: hold the pose for a while, then say that it is out of range or lost."""
+        """Below the gate: hold the pose for a while, then say that it is lost.
+
+        However far it was turned: it may as well have been hidden by a hand, or turned back, and out of range would be read as
+        a look at what lies behind.
+        """
         assert self._pose is not None
         assert self._neck is not None
         self._velocity = np.zeros(6)
         self._neck.rest()
-        yaw = self._pose.angles_deg()[0]
-        if dt <= self._config.hold_s:
-            return self._state(held_s=dt)
-        if abs(yaw) >= self._config.turned_deg:
-            return HeadState("out_of_range", side=self._gone or side_of(yaw))
-        return HeadState("lost")
+        return self._state(held_s=dt) if dt <= self._config.hold_s else HeadState("lost")
 
     def _state(self, held_s: float) -> HeadState:
         assert self._pose is not None
         angles = self._pose.angles_deg()
-        if abs(angles[0]) > min(self._config.range_deg, FARTHEST_DEG):
+        beyond_deg = min(self._config.range_deg, FARTHEST_DEG)
+        if abs(angles[0]) > beyond_deg:
             # The back of a head carries little texture, and its yaw may pass 180: the side is the one it left to.
             self._gone = self._gone or side_of(angles[0])
-            return HeadState("out_of_range", side=self._gone)
+            return HeadState("out_of_range", side=self._gone, beyond_deg=beyond_deg)
         self._gone = None
         return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
 

@@ -94,7 +94,7 @@ class RegressedHead:
         of_yaw, of_pitch, of_roll = (float(value) for value in variances)
         # Fusion takes it as certain that the head looks out there: it is only said where the sigma leaves no other choice.
         if abs(yaw) - of_yaw**0.5 > self._config.range_deg:
-            return HeadState("out_of_range", side=side_of(yaw))
+            return HeadState("out_of_range", side=side_of(yaw), beyond_deg=self._config.range_deg)
         return HeadState("tracking", (yaw, pitch, roll), of_yaw**0.5, None, (of_yaw, of_pitch, of_roll))
 
 

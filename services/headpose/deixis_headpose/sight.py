@@ -27,6 +27,7 @@ class HeadState:
     """The answer for one head in one frame. angles_deg: yaw, pitch, roll.
 
     sigma_deg: of the yaw. variances_deg2: of all three, where the method tells them. face_width_px: from the front, likewise.
+    beyond_deg: where out of range, the yaw beyond which the method reads no head.
     """
 
     status: PoseStatus
@@ -35,11 +36,12 @@ class HeadState:
     side: Side | None = None
     variances_deg2: tuple[float, float, float] | None = None
     face_width_px: float | None = None
+    beyond_deg: float | None = None
 
     def of_person(self, person_id: int) -> HeadPose:
         """As a message."""
         if self.status != "tracking" or self.angles_deg is None:
-            return HeadPose(person_id=person_id, status=self.status, side=self.side)
+            return HeadPose(person_id=person_id, status=self.status, side=self.side, beyond_deg=self.beyond_deg)
         yaw, pitch, roll = self.angles_deg
         covariance = None
         if self.variances_deg2 is not None:
