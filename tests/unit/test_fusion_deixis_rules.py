@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from deixis_fusion.config import FusionConfig
+from deixis_fusion.confusion import table_1
 from deixis_fusion.curves import BEARINGS, at, gesture_curve, hand_curve, head_curve
 from deixis_fusion.decision import Judgement
 from deixis_fusion.deixis_rules import likeliest
 from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, PointingGesture, Witness
 from deixis_fusion.fusion import rules_of
 from deixis_fusion.localisation import PersonPlace, wrapped_deg
-from deixis_fusion.paper_rules import TABLE_1
+from deixis_fusion.pointing import GESTURES
 from deixis_fusion.sight import Lookout, Points
 from deixis_fusion.visibility import Candidate, Walls
 from deixis_schemas.messages import Poi, Side
@@ -50,7 +51,7 @@ def best(judgement: Judgement, degrees: tuple[float, ...] = AROUND) -> float:
 
 def test_gestures_of_a_bearing_are_all_there_are() -> None:
     # But for the floor below which no gesture falls.
-    total = sum(gesture_curve(gesture, CONFIG.hand) for gesture in TABLE_1)
+    total = sum(gesture_curve(gesture, CONFIG.hand, table_1()) for gesture in GESTURES)
     assert np.all((total > 0.97) & (total < 1.05))
 
 

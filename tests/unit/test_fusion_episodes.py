@@ -474,6 +474,17 @@ def test_the_papers_rules_answer_too() -> None:
     assert scene.finals[0].evidence[0].masses[0].poi_ids == ["f", "g", "h", "i"][1:]
 
 
+def test_what_the_robot_does_not_see_is_no_poi_by_the_papers_rules() -> None:
+    scenes = {rules: Scene(FusionConfig(rules=rules)) for rules in ("paper", "deixis")}
+    for scene in scenes.values():
+        # Halfway between the robot and the POI that is meant, beside the line from person to POI.
+        x, y, _ = scene.poi("g", 60).position_m
+        scene.fusion.set_walls([((x / 2 - 0.3, y / 2), (x / 2 + 0.3, y / 2))])
+        point(scene, 60)
+    assert scenes["deixis"].finals[0].poi_ids == ["g"]
+    assert "g" not in scenes["paper"].finals[0].poi_ids
+
+
 def test_masses_of_every_source_are_shown_and_sum_to_one() -> None:
     scene = Scene()
     point(scene, 60)

@@ -7,9 +7,11 @@ import math
 import pytest
 from deixis_fusion.belief import BeliefAssignment, as_set
 from deixis_fusion.config import FusionConfig
-from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, PointingGesture, Witness
+from deixis_fusion.confusion import table_1
+from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Witness
 from deixis_fusion.fusion import rules_of
-from deixis_fusion.paper_rules import TABLE_1, PaperRules, face_assignment, gesture_sets, largest_focal_sets
+from deixis_fusion.paper_rules import PaperRules, face_assignment, gesture_sets, largest_focal_sets
+from deixis_fusion.pointing import PointingGesture
 from deixis_fusion.visibility import Candidate
 from deixis_schemas.messages import Poi
 from hypothesis import given
@@ -26,37 +28,32 @@ def seen(*degrees: float, sigma: float = 3.0) -> list[Candidate]:
     return [Candidate(Poi(poi_id=f"P{i}", position_m=(0, 0, 0)), d, sigma) for i, d in enumerate(degrees)]
 
 
-def test_every_column_of_table_1_sums_to_one() -> None:
-    for region in ("left", "center", "right"):
-        assert sum(TABLE_1[gesture][region] for gesture in TABLE_1) == pytest.approx(1.0)
-
-
 def test_equation_16_counts_the_pois_of_each_region() -> None:
     # Eight POIs as in figure 5: two on the left, two on the right, four in the centre (front and back).
     degrees = [10, -20, 60, 100, -60, -100, 160, 175]
-    assignment = gesture_sets("point_left", degrees, LIMITS)
+    assignment = gesture_sets("point_left", degrees, LIMITS, table_1())
     left, center = as_set([2, 3]), as_set([0, 1, 6, 7])
     total = 0.90 * 2 / 8 + 0.05 * 4 / 8
     assert assignment.masses == {left: pytest.approx(0.90 * 2 / 8 / total), center: pytest.approx(0.05 * 4 / 8 / total)}
 
 
 def test_an_invisible_gesture_speaks_for_the_centre() -> None:
-    assignment = gesture_sets("invisible", [0, 60, -60], LIMITS)
+    assignment = gesture_sets("invisible", [0, 60, -60], LIMITS, table_1())
     assert assignment.masses[0b001] == pytest.approx(0.9 / 1.1)
 
 
 def test_a_gesture_that_no_poi_explains_is_vacuous() -> None:
-    assert gesture_sets("point_left", [-60, -90], LIMITS).unknown == 1.0
+    assert gesture_sets("point_left", [-60, -90], LIMITS, table_1()).unknown == 1.0
 
 
 @given(bearings, gestures)
 def test_equation_16_gives_an_assignment_for_any_arrangement(degrees: list[float], gesture: PointingGesture) -> None:
-    masses = gesture_sets(gesture, degrees, LIMITS).masses
+    masses = gesture_sets(gesture, degrees, LIMITS, table_1()).masses
     assert math.fsum(masses.values()) == pytest.approx(1.0)
 
 
 def test_equation_18_is_proportional_to_the_likelihoods() -> None:
-    assert face_assignment([0.2, 0.6, 0.0], None).singletons() == pytest.approx([0.25, 0.75, 0.0])
+    assert face_assignment([0.2, 0.6, 0.0], [False] * 3).singletons() == pytest.approx([0.25, 0.75, 0.0])
 
 
 def test_a_face_not_computed_puts_the_far_pois_mass_on_their_set() -> None:
@@ -64,16 +61,40 @@ def test_a_face_not_computed_puts_the_far_pois_mass_on_their_set() -> None:
     assert assignment.masses == {0b001: pytest.approx(0.1), 0b110: pytest.approx(0.9)}
 
 
-def test_the_papers_head_out_of_range_means_the_pois_out_there() -> None:
-    assignment = PaperRules(PAPER.paper).head(HeadObservation(None), seen(0, 60, 150, -150))
-    assert assignment.masses == {0b1100: pytest.approx(1.0)}
+def head_masses(head: HeadObservation, *degrees: float) -> BeliefAssignment:
+    return PaperRules(PAPER.paper, PAPER.confusion).head(head, seen(*degrees))
+
+
+def test_the_papers_head_not_computed_is_that_row_of_figure_6() -> None:
+    # At 0, 60 and 130 degrees .005, .025 and .8 of the heads are not computed, at 150 all.
+    assignment = head_masses(HeadObservation(None), 0, 60, 130, -150)
+    total = 0.005 + 0.025 + 0.8 + 1
+    assert assignment.masses == {
+        0b0001: pytest.approx(0.005 / total),
+        0b0010: pytest.approx(0.025 / total),
+        0b1100: pytest.approx(1.8 / total),
+    }
+
+
+def test_the_papers_head_is_read_between_the_columns_of_figure_6() -> None:
+    # Perceived 60: of a POI at 60 .75, at 65 half of .75 and .1275, at 120 none, to the other side none.
+    masses = head_masses(HeadObservation(60.0, 3.0), 60, 65, 120, -60).singletons()
+    between = (0.75 + 0.1275) / 2
+    assert masses == pytest.approx([0.75 / (0.75 + between), between / (0.75 + between), 0, 0])
+
+
+def test_a_yaw_that_no_poi_explains_is_vacuous() -> None:
+    assert head_masses(HeadObservation(0.0), 60, -100).unknown == 1.0
 
 
 @pytest.mark.parametrize("head", [HeadObservation(None, beyond_deg=100), HeadObservation(125, 3)])
 def test_the_papers_head_has_the_range_of_the_stage_that_read_it(head: HeadObservation) -> None:
     limit = 110 if head.yaw_deg is None else 130
-    masses = PaperRules(PAPER.paper).head(head, seen(0, 60, limit, -limit)).masses
-    assert masses == {0b1100: pytest.approx(1.0)}
+    # Of a reader that ends at 100, nearly all heads turned to 110 are not computed.
+    beyond = 0.8 if head.yaw_deg else 0.0417 + 0.5833 + 0.1875
+    total = 0.005 + 0.025 + 2 * beyond
+    masses = head_masses(head, 0, 60, limit, -limit).masses
+    assert masses[0b1100] == pytest.approx(2 * beyond / total, abs=2e-4)
 
 
 def test_the_papers_choice_is_the_union_of_the_largest_focal_sets() -> None:
@@ -83,6 +104,19 @@ def test_the_papers_choice_is_the_union_of_the_largest_focal_sets() -> None:
 def test_one_poi_in_sight_is_named_by_those_who_point_at_it() -> None:
     evidence = Evidence(HandObservation("point_left", 55.0, 10.0), SAID, HeadObservation(57.0, 4.0), SAID)
     assert rules_of(PAPER).judge(seen(60), evidence).poi_ids == ("P0",)
+
+
+def test_the_paper_never_abstains_where_anything_was_observed() -> None:
+    # All three stand on the left, and the gesture says so: the set is the whole frame.
+    judged = rules_of(PAPER).judge(seen(60, 80, 100), Evidence(HandObservation("point_left"), SAID, None, SAID))
+    assert judged.poi_ids == ("P0", "P1", "P2")
+
+
+def test_the_paper_answers_a_total_conflict_with_all_pois() -> None:
+    evidence = Evidence(HandObservation("point_left"), SAID, HeadObservation(-60.0), SAID)
+    judged = rules_of(PAPER).judge(seen(60, -60), evidence)
+    assert judged.combination.conflict == 1.0
+    assert judged.poi_ids == ("P0", "P1")
 
 
 @pytest.mark.parametrize("degrees", [(60.0,), (60.0, -60.0)])

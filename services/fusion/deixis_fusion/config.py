@@ -7,6 +7,8 @@ from typing import Literal
 from deixis_runtime.settings import StageConfig
 from pydantic import Field, model_validator
 
+from .confusion import ConfusionConfig
+
 
 class JoiningConfig(StageConfig):
     """When a frame is answered, and who is not waited for."""
@@ -84,7 +86,6 @@ class PaperConfig(StageConfig):
     phi_f_max_deg: float = Field(
         default=120, gt=0, le=180, description="Largest yaw at which a head is recognised; less where the stage tells less."
     )
-    head_sigma_deg: float = Field(default=10, gt=0, le=90, description="Stands for the confusions of fig. 6.")
 
     @model_validator(mode="after")
     def _range_is_a_range(self) -> PaperConfig:
@@ -115,7 +116,6 @@ class AnswerConfig(StageConfig):
     `tempering`, `tie_ratio` and the limits are chosen by `python fitting/choose_decision.py`, on made-up strokes: see there.
     """
 
-    max_unknown: float = Field(default=0.9, gt=0, le=1, description="paper: with more mass on the whole frame, abstain.")
     # On made-up strokes least log loss lies at 0.8 to 0.9. Calibration error (ECE) at 0.85: .043 by our own model, .024 by a
     # worse one; of pignistic probabilities .072 and .020.
     tempering: float = Field(
@@ -144,13 +144,14 @@ class FusionConfig(StageConfig):
 
     rules: Literal["paper", "deixis"] = Field(
         default="deixis",
-        description="`paper`: eqs 16 and 18 to the letter; `deixis`: with likelihoods of bearing and head gain.",
+        description="`paper`: section 6 to the letter; `deixis`: with likelihoods of bearing and head gain.",
     )
     registry: str | None = Field(
         default=None, max_length=4096, description="SQLite file of the POIs; a default place if empty."
     )
     joining: JoiningConfig = Field(default_factory=JoiningConfig, description="Joining of what the stages say of a frame.")
     place: PlaceConfig = Field(default_factory=PlaceConfig, description="Places of persons and of the robot.")
+    confusion: ConfusionConfig = Field(default_factory=ConfusionConfig, description="Table 1 and figure 6.")
     hand: HandConfig = Field(default_factory=HandConfig, description="deixis: the hand, beyond eq. 16.")
     head: HeadConfig = Field(default_factory=HeadConfig, description="deixis: the head, beyond eq. 18.")
     paper: PaperConfig = Field(default_factory=PaperConfig, description="paper: eqs 16 and 18.")

@@ -12,8 +12,9 @@ import numpy.typing as npt
 from deixis_schemas.messages import BEARING_STEP_DEG, Side
 
 from .config import HandConfig, HeadConfig
-from .evidence import HandObservation, HeadObservation, PointingGesture
-from .paper_rules import TABLE_1
+from .confusion import HandConfusion, table_1
+from .evidence import HandObservation, HeadObservation
+from .pointing import PointingGesture
 
 Values = npt.NDArray[np.float64]
 Curve = Values
@@ -50,22 +51,22 @@ def rise(x: Values, width: float) -> Values:
 # --- the hand ---------------------------------------------------------------------------------------------------------
 
 
-def hand_curve(hand: HandObservation, config: HandConfig) -> Curve:
-    """P(gesture | bearing) P(hand's bearing | bearing)."""
-    return gesture_curve(hand.gesture, config) * _bearing_curve(hand, config)
+def hand_curve(hand: HandObservation, config: HandConfig, confusion: HandConfusion | None = None) -> Curve:
+    """P(gesture | bearing) P(hand's bearing | bearing); by the paper's table 1 where no other is given."""
+    return gesture_curve(hand.gesture, config, confusion or table_1()) * _bearing_curve(hand, config)
 
 
-def gesture_curve(gesture: PointingGesture, config: HandConfig) -> Curve:
+def gesture_curve(gesture: PointingGesture, config: HandConfig, confusion: HandConfusion) -> Curve:
     """P(gesture | bearing): table 1's columns, blended over the borders of the hand's range instead of cut there."""
     size, soft = np.abs(BEARINGS), config.soft_deg
     inside = rise(size - config.min_deg, soft) * rise(config.max_deg - size, soft)
-    row, miss = TABLE_1[gesture], config.miss
+    center, miss = confusion.share(gesture, "center"), config.miss
     left = rise(np.sin(np.radians(BEARINGS)), SIDE_BORDER)
     # Table 1 is of fingers seen well; how often one is missed within its range depends on the camera.
     agrees = {"point_left": left, "point_right": 1 - left, "invisible": np.full_like(left, 0.5)}[gesture]
     beside = np.full_like(left, miss) if gesture == "invisible" else (1 - miss) * agrees
     # In the centre table 1 gives both sides .05 on average: more to a POI that lies a little to the side of the gesture.
-    return np.maximum(WRONG_SIDE, inside * beside + (1 - inside) * row["center"] * 2 * agrees)
+    return np.maximum(WRONG_SIDE, inside * beside + (1 - inside) * center * 2 * agrees)
 
 
 def _bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:

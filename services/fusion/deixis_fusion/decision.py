@@ -89,7 +89,7 @@ class MassRules(Protocol):
         ...
 
     def choose(self, combination: Combination, evidence: Evidence, seen: Sequence[Candidate]) -> Choice:
-        """The answer to a belief that tells the POIs apart, or that is about a single one."""
+        """The answer to the combined belief, where anything was observed."""
         ...
 
 
@@ -98,28 +98,23 @@ class ByMasses:
     """Rules by masses, with what all share: a source that observed nothing is vacuous, and chances are pignistic."""
 
     rules: MassRules
-    max_unknown: float
     credible: float
 
     def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
         """Weigh and combine."""
-        return decide(seen, evidence, self.rules, self.max_unknown, self.credible)
+        return decide(seen, evidence, self.rules, self.credible)
 
 
-def decide(
-    seen: Sequence[Candidate], evidence: Evidence, rules: MassRules, max_unknown: float, credible: float = 0.9
-) -> Judgement:
-    """Weigh and combine; a source that observed nothing is vacuous. With more than `max_unknown` on the whole frame, abstain.
+def decide(seen: Sequence[Candidate], evidence: Evidence, rules: MassRules, credible: float = 0.9) -> Judgement:
+    """Weigh and combine; a source that observed nothing is vacuous. Where neither did, there is no question to answer.
 
-    Of a single POI the whole frame is all there is: there it counts whether anything was observed.
     Raises ValueError where no POI is seen.
     """
     size = len(seen)
     hand = rules.hand(evidence.hand, seen) if evidence.hand is not None else vacuous(size)
     head = rules.head(evidence.head, seen) if evidence.head is not None else vacuous(size)
     combination = combine(hand, head)
-    silent = evidence.hand is None and evidence.head is None
-    if silent or (size > 1 and combination.belief.unknown > max_unknown):
+    if evidence.hand is None and evidence.head is None:
         choice = Choice((), "nothing was observed that tells the POIs apart")
     else:
         choice = rules.choose(combination, evidence, seen)

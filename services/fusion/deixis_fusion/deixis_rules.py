@@ -9,16 +9,17 @@ toward the person's own left.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from .config import AnswerConfig, HandConfig, HeadConfig
+from .confusion import HandConfusion, table_1
 from .decision import Choice, Judgement
 from .evidence import Evidence, HandObservation, HeadObservation
-from .mass_vector import MassVector, combine
-from .paper_rules import TABLE_1
+from .mass_vector import Flags, MassVector, combine
+from .pointing import Region
 from .sight import Sight
 from .visibility import Candidate
 from .weighing import Weighing, weigh
@@ -37,14 +38,15 @@ class DeixisRules:
     hand_config: HandConfig
     head_config: HeadConfig
     answer: AnswerConfig
+    confusion: HandConfusion = field(default_factory=table_1)
 
     def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
         """Weigh, and answer. `seen` is not empty."""
         sight = Sight.of(seen)
-        weighed = weigh(evidence, sight, self.hand_config, self.head_config)
+        weighed = weigh(evidence, sight, self.hand_config, self.head_config, self.confusion)
         hand, head = MassVector.vacuous(len(sight)), MassVector.vacuous(len(sight))
         if evidence.hand is not None:
-            hand = hand_masses(evidence.hand, weighed.hand, sight, self.hand_config)
+            hand = hand_masses(evidence.hand, weighed.hand, sight, self.hand_config, self.confusion)
         if evidence.head is not None:
             head = head_masses(evidence.head, weighed.head, weighed.head_floor, self.head_config)
         chances = weighed.chances(self.answer.tempering)
@@ -84,25 +86,24 @@ def _tells(likelihoods: Values, observed: HandObservation | HeadObservation | No
 # --- masses, to explain by ---------------------------------------------------------------------------------------------
 
 
-def hand_masses(hand: HandObservation, likelihoods: Values, seen: Sight, config: HandConfig) -> MassVector:
+def hand_masses(
+    hand: HandObservation, likelihoods: Values, seen: Sight, config: HandConfig, confusion: HandConfusion
+) -> MassVector:
     """Eq. 16 refined by the bearing of the hand: its sets keep part of their mass, the rest goes to single POIs.
 
     Without a bearing and with hard borders the single masses of a region sum to its mass by eq. 16, so the refinement adds
     what the bearing tells and nothing else.
     """
     single = MassVector.normalised(likelihoods)
-    return single.mixed(_regions(hand, seen.bearings.likeliest, config), config.refinement).discounted(config.discount)
+    regions = _regions(hand, seen.bearings.likeliest, config, confusion)
+    return single.mixed(regions, config.refinement).discounted(config.discount)
 
 
-def _regions(hand: HandObservation, bearings: Values, config: HandConfig) -> MassVector:
+def _regions(hand: HandObservation, bearings: Values, config: HandConfig, confusion: HandConfusion) -> MassVector:
     """Eq. 16: the sets of POIs on the left, on the right and in the centre; P(G) is the share of the POIs in region G."""
     beside = (np.abs(bearings) >= config.min_deg) & (np.abs(bearings) <= config.max_deg)
-    regions = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
-    row = TABLE_1[hand.gesture]
-    weights = [
-        (flags, row["left" if name == "left" else "right" if name == "right" else "center"] * float(flags.mean()))
-        for name, flags in regions.items()
-    ]
+    regions: dict[Region, Flags] = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
+    weights = [(flags, confusion.share(hand.gesture, name) * float(flags.mean())) for name, flags in regions.items()]
     return MassVector.normalised(np.zeros(len(bearings)), weights)
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from deixis_schemas.messages import Gesture, HeadPose, Side, SourceStatus
 
 from .localisation import PersonPlace, wrapped_deg
+from .pointing import PointingGesture
 
 Values = npt.NDArray[np.float64]
-PointingGesture = Literal["point_left", "invisible", "point_right"]
 StageStatus = tuple[SourceStatus, str]
 
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")

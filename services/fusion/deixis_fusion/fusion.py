@@ -33,6 +33,7 @@ from .gathering import StageStatus, gather, stages_of
 from .joining import JoinedFrame
 from .localisation import Camera, PersonLocator, RobotPlace, face_of
 from .paper_rules import PaperRules
+from .paper_sight import seen_by_both
 from .report import PersonReport, Rows, TargetReport
 from .robot_path import RobotFix, RobotPath
 from .sight import Lookout, Points
@@ -79,8 +80,8 @@ class _Person:
 def rules_of(config: FusionConfig) -> Rules:
     """The rules by their setting."""
     if config.rules == "paper":
-        return ByMasses(PaperRules(config.paper), config.answer.max_unknown, config.answer.credible)
-    return DeixisRules(config.hand, config.head, config.answer)
+        return ByMasses(PaperRules(config.paper, config.confusion), config.answer.credible)
+    return DeixisRules(config.hand, config.head, config.answer, config.confusion.hand)
 
 
 class Fusion:
@@ -212,6 +213,8 @@ class Fusion:
         place, judgement = (last_place(stroke.samples) if stroke else None) or person.locator.place, None
         if place is not None:
             seen = person.lookout.look(place, self._points, self._walls)
+            if self._config.rules == "paper":
+                seen = seen_by_both(seen, place, self._walls, self._config.place.wall_clearance_m)
             judgement = self._rules.judge(seen, evidence) if len(seen) else None
         if judgement is not None:
             judgement = person.caution.judged(judgement, evidence)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
-from .evidence import POINTING, HandObservation, PointingGesture, Sample, Values, Weighed
+from .evidence import POINTING, HandObservation, Sample, Values, Weighed
+from .pointing import PointingGesture
 from .robust import majority, median, median_angle
 
 # A finger seen in this part of the frames is seen: at VGA it comes and goes with the outline.

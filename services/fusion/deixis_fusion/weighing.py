@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .config import HandConfig, HeadConfig
+from .confusion import HandConfusion
 from .curves import BEARINGS, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
 from .sight import Sight
@@ -46,15 +47,22 @@ class Weighing(NamedTuple):
         return np.asarray(weights / weights.sum())
 
 
-def weigh(evidence: Evidence, seen: Sight, hand_config: HandConfig, head_config: HeadConfig) -> Weighing:
-    """Weigh all POIs in sight (one at least); a source that says nothing is as likely with each.
+def weigh(
+    evidence: Evidence,
+    seen: Sight,
+    hand_config: HandConfig,
+    head_config: HeadConfig,
+    confusion: HandConfusion | None = None,
+) -> Weighing:
+    """Weigh all POIs in sight (one at least), by the paper's table 1 or another. A source that says nothing fits each alike.
 
     The frames of a stroke err alike: what was seen from several places is one observation, and each counts by its share of it
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
     told, best, floor = np.ones((2, *seen.bearings.cases.shape)), 1.0, 1.0
     for view in evidence.views or (View(evidence.hand, evidence.head),):
-        curves = np.stack([_hand(view.hand, view.hand_share, hand_config), _head(view.head, view.head_share, head_config)])
+        of_hand = _hand(view.hand, view.hand_share, hand_config, confusion)
+        curves = np.stack([of_hand, _head(view.head, view.head_share, head_config)])
         bearings = seen.bearings if view.place is None else seen.seen_from(view.place)
         told *= at(curves, bearings.cases)
         best *= float(curves.max(axis=1).prod())
@@ -69,10 +77,10 @@ def shares(weights: Sequence[float]) -> list[float]:
     return [weight / total for weight in weights] if total > 0 else list(weights)
 
 
-def _hand(hand: HandObservation | None, share: float, config: HandConfig) -> Values:
+def _hand(hand: HandObservation | None, share: float, config: HandConfig, confusion: HandConfusion | None) -> Values:
     if hand is None or share <= 0:
         return np.ones_like(BEARINGS)
-    return np.asarray(hand_curve(hand, config) ** (share * _trust(hand.agreement)))
+    return np.asarray(hand_curve(hand, config, confusion) ** (share * _trust(hand.agreement)))
 
 
 def _head(head: HeadObservation | None, share: float, config: HeadConfig) -> Values:
