@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from deixis_fusion.config import FusionConfig
-from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, PointingGesture, Witness
+from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Witness
 from deixis_fusion.localisation import PersonPlace, bearing_deg, wrapped_deg
+from deixis_fusion.pointing import PointingGesture
 from deixis_fusion.sight import Lookout, Points, Sight
 from deixis_fusion.visibility import Walls
 from deixis_schemas.messages import Poi
