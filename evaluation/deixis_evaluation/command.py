@@ -22,6 +22,9 @@ from .clip_progress import played
 from .clip_score import ClipScore
 from .clips import Clip, ClipError
 from .evaluate import EvaluationOptions, Interrupted, evaluate_clip
+from .fusion_command import check_fusion, run_fusion
+from .gesture_command import check_gesture, run_gesture
+from .hand_confusion import write_confusion
 from .headpose_command import check_headpose, run_headpose
 from .headpose_report import HeadposeConditions
 from .json_file import check_writable, write_json
@@ -36,7 +39,7 @@ from .tracker_command import check_tracker, run_tracker
 
 TABLE_WIDTH = 150
 """Of a table that goes to a file: a terminal has its own."""
-SCORED_ALONE = ("headpose", "tracker")
+SCORED_ALONE = ("headpose", "tracker", "gesture", "fusion")
 """Stages that `--stage` knows."""
 
 
@@ -69,6 +72,12 @@ def register(subparsers: Any) -> None:
         help="write NAME.jsonl there, one line per message published; with --stage NAME.png, the stage's answers over time",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all scores to this file")
+    parser.add_argument(
+        "--confusion",
+        type=Path,
+        metavar="FILE",
+        help="with --stage gesture: write table 1 as measured; fusion reads it (--set fusion.confusion.hand=FILE)",
+    )
     parser.add_argument("--only-clips", default="*", metavar="GLOB", help="only clips whose name fits, e.g. 'c*'")
     parser.add_argument(
         "--set", action="append", default=[], dest="sets", metavar="STAGE.NAME=VALUE", help="override a setting of a stage"
@@ -78,9 +87,11 @@ def register(subparsers: Any) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Score the clips. 0 when all were played, 1 when one was not. Raises CommandError or HostFailed."""
+    if given.confusion is not None and given.stage != "gesture":
+        raise CommandError("--confusion: goes with --stage gesture")
     if given.stage is None:
         return _run_system(given)
-    return _run_headpose(given) if given.stage == "headpose" else _run_tracker(given)
+    return RUNS_ALONE[given.stage](given)
 
 
 def _run_system(given: argparse.Namespace) -> int:
@@ -119,6 +130,36 @@ def _run_tracker(given: argparse.Namespace) -> int:
     chosen = _choose(given)
     check_writable(given.json)
     return run_tracker(chosen, config, sets, given.json, _console())
+
+
+def _run_gesture(given: argparse.Namespace) -> int:
+    if given.out is not None:
+        raise CommandError("--out: with --stage gesture nothing is drawn; --json keeps its figures")
+    sets = stage_settings(given.sets)
+    setup = check_gesture(given.truth, sets)
+    chosen = _choose(given)
+    check_writable(given.json)
+    check_writable(given.confusion, "--confusion")
+    status, scores = run_gesture(chosen, setup, sets, given.json, _console())
+    if given.confusion is not None:
+        clips = f"seeds {chosen.seeds}" if chosen.seeds else f"clips of {chosen.folder.name}"
+        strokes = [stroke for score in scores for stroke in score.strokes]
+        write_confusion(given.confusion, strokes, f"deixis eval --stage gesture, {clips}")
+    return status
+
+
+def _run_fusion(given: argparse.Namespace) -> int:
+    if given.out is not None:
+        raise CommandError("--out: with --stage fusion nothing is drawn; --json keeps its figures")
+    sets = stage_settings(given.sets)
+    config = check_fusion(given.truth, sets)
+    chosen = _choose(given)
+    check_writable(given.json)
+    return run_fusion(chosen, config, sets, given.json, _console())
+
+
+RUNS_ALONE = {"headpose": _run_headpose, "tracker": _run_tracker, "gesture": _run_gesture, "fusion": _run_fusion}
+"""What scores each of SCORED_ALONE."""
 
 
 def _choose(given: argparse.Namespace) -> Chosen:

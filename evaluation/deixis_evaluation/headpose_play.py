@@ -11,19 +11,16 @@ from dataclasses import dataclass, field
 from deixis_headpose.config import HeadposeConfig
 from deixis_headpose.estimator import HeadPoseEstimator
 from deixis_runtime.lens import Lens, LensError
-from deixis_schemas.messages import HeadPoses, OfFrame, Producer, Tracks
+from deixis_schemas.messages import HeadPoses, Producer
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.tracker import FrameRefused, Tracker
 
 from .clips import Clip, ClipError
 from .head_samples import head_samples
 from .headpose_scores import HeadposeScore
 from .matching import true_persons
 from .recording import Recording
-from .replay import INSTANCE, Given, Picture, ReplayError
-from .true_tracks import TrueTracks
-
-See = Callable[[OfFrame, Picture], Tracks]
+from .replay import INSTANCE, Given, ReplayError
+from .seeing import seen_by_tracker, seen_in_labels
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ def play_heads(clip: Clip, setup: HeadposeSetup, on_frame: Callable[[], None] = 
     """What tracker and headpose say of each frame. Raises ClipError, LensError or ReplayError."""
     given, recording = Given(clip), Recording()
     lens, estimator = Lens.of(given.camera()), HeadPoseEstimator(setup.headpose)
-    see = _seen_in_labels(clip) if setup.true_tracks else _seen_by_tracker(setup.tracker)
+    see = seen_in_labels(clip) if setup.true_tracks else seen_by_tracker(setup.tracker)
     for frame, picture in given.pictures():
         tracks = see(frame, picture)
         poses = estimator.update(picture, tracks.tracks, lens, frame.run, frame.stamp_ns)
@@ -59,22 +56,3 @@ def play_heads(clip: Clip, setup: HeadposeSetup, on_frame: Callable[[], None] = 
         recording.add(HeadPoses.derive(frame, Producer("headpose", INSTANCE), poses=poses), frame.stamp_ns)
         on_frame()
     return recording
-
-
-def _seen_in_labels(clip: Clip) -> See:
-    truth = TrueTracks(clip)
-    return lambda frame, _: truth.of_frame(frame)
-
-
-def _seen_by_tracker(config: TrackerConfig) -> See:
-    tracker = Tracker(config)
-
-    def see(frame: OfFrame, picture: Picture) -> Tracks:
-        try:
-            tracks = tracker.update(picture, frame.run, frame.stamp_ns)
-        except FrameRefused:
-            tracks = []  # as the stage's shell answers
-        height, width = picture.shape[:2]
-        return Tracks.derive(frame, Producer("tracker", INSTANCE), width=width, height=height, tracks=tracks)
-
-    return see

@@ -9,15 +9,15 @@ from typing import Any
 from deixis_cli.options import CommandError
 
 
-def check_writable(path: Path | None) -> None:
-    """Make the file where one is named. Raises CommandError."""
+def check_writable(path: Path | None, option: str = "--json") -> None:
+    """Make the file where the option names one. Raises CommandError."""
     if path is None:
         return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.open("a", encoding="utf-8").close()
     except OSError as error:
-        raise CommandError(f"--json {path}: {error.strerror}") from None
+        raise CommandError(f"{option} {path}: {error.strerror}") from None
 
 
 def write_json(path: Path | None, content: dict[str, Any]) -> None:

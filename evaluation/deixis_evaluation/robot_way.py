@@ -33,13 +33,14 @@ class RobotWay:
 
     def begin(self) -> Sequence[Message]:
         """The first poses, in lockstep."""
-        return self._say(0, START_NS) if self._lockstep else ()
+        return self.ahead_of(0, START_NS) if self._lockstep else ()
 
     def hear(self, message: Message) -> Sequence[Message]:
         """The poses up to AHEAD frames after a frame."""
-        return self._say(message.seq, message.stamp_ns) if isinstance(message, Frame) else ()
+        return self.ahead_of(message.seq, message.stamp_ns) if isinstance(message, Frame) else ()
 
-    def _say(self, seq: int, stamp_ns: int) -> list[Message]:
+    def ahead_of(self, seq: int, stamp_ns: int) -> list[RobotPose]:
+        """Poses from a frame on that were not said yet."""
         upto = min(len(self._path), seq + AHEAD)
         wanted = range(max(self._said, seq), upto)
         self._said = max(self._said, upto)

@@ -40,6 +40,7 @@ Pixel = Annotated[float, Field(ge=-4 * MAX_SIDE_PX, le=4 * MAX_SIDE_PX)]
 FarPixel = Annotated[float, Field(ge=-1e9, le=1e9)]  # summed up: a robot that turns on the spot for a day comes to 1e8
 Extent = Annotated[float, Field(ge=0, le=MAX_SIDE_PX)]
 Metre = Annotated[float, Field(ge=-1e5, le=1e5)]
+LogOdds = Annotated[float, Field(ge=-100, le=100)]
 Degree = Annotated[float, Field(ge=-360, le=360)]
 Variance = Annotated[float, Field(gt=0, le=180**2)]
 Covariance = Annotated[float, Field(ge=-(180**2), le=180**2)]
@@ -320,6 +321,12 @@ class Gesture(Part):
         max_length=BEARINGS,
         description="How likely what is seen is if the person points to bearing -180, -175 ... 175 degrees, beside the best; "
         "empty, or all of them. It says more than mean and sigma do: front and back, and what no arm does.",
+    )
+    point_probability: Share | None = Field(
+        default=None, description="That this stroke is a pointing; none outside of strokes, and of a stage that does not weigh."
+    )
+    point_log_odds: dict[Annotated[str, Field(max_length=32)], LogOdds] = Field(
+        default_factory=dict, max_length=16, description="What spoke for a pointing (above 0) and against it (below), by name."
     )
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from deixis_gesture.fingertips import find_fingers
 from deixis_gesture.hand import Face, hand_of, unpack_contour
-from deixis_gesture.rules import StrokeGesture, vote
+from deixis_gesture.rules import PaperStroke, vote
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -111,8 +111,8 @@ def test_face_widths_and_pixels_convert_both_ways():
 
 
 def _decided(votes, rate_hz=30, allowed=True):
-    stroke = StrokeGesture(0.2)
-    return [stroke.add(i / rate_hz, seen, allowed) for i, seen in enumerate(votes)]
+    stroke = PaperStroke(0.2)
+    return [stroke.count(i / rate_hz, seen, allowed) for i, seen in enumerate(votes)]
 
 
 def test_a_stroke_is_decided_when_it_has_settled_and_not_before():

@@ -222,7 +222,7 @@ def test_a_hand_changes_its_side_as_fast_at_any_frame_rate(rate_hz):
     for i in range(3 * rate_hz):
         time_s = i / rate_hz
         hand = _hand((2.0, 4.0), (), kind="left_hand" if time_s < 1 else "right_hand")
-        arm.update(hand, face, (0.0, 0.0), time_s, 1 / rate_hz, walking=False, joined=False)
+        arm.update(hand, face, (0.0, 0.0), time_s, 1 / rate_hz)
         changed_s = time_s if arm.side == "right" and changed_s is None else changed_s
     assert changed_s == pytest.approx(1.14, abs=0.12)
 
@@ -233,7 +233,7 @@ def test_the_bearing_is_that_of_the_last_half_second_at_any_frame_rate(rate_hz):
     for i in range(2 * rate_hz + 1):
         time_s = i / rate_hz
         place = (-3.4 if time_s < 1.6 else -3.2, 1.0)
-        arm.update(_hand(place, POINT), face, (0.0, 0.0), time_s, 1 / rate_hz, walking=False, joined=False)
+        arm.update(_hand(place, POINT), face, (0.0, 0.0), time_s, 1 / rate_hz)
     assert arm.phase == "stroke"
     assert arm.sight is not None
     assert arm.sight.offset == pytest.approx(-3.95, abs=0.1)

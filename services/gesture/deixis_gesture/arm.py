@@ -10,10 +10,13 @@ from deixis_schemas.messages import GestureKind, Phase, Side, Track
 
 from .bearing import HandSight
 from .config import GestureConfig
+from .deixis_stroke import DeixisStroke
 from .fingertips import Finger, find_fingers
 from .hand import CHEST, Face, HandShape, hand_of, unpack_contour
+from .held_hand import held_hand
 from .phases import PhaseTracker
-from .rules import StrokeGesture, Vote, vote
+from .rules import PaperStroke
+from .stroke import Look, StrokeRules, Verdict
 
 Point = tuple[float, float]
 
@@ -31,7 +34,8 @@ class Arm:
     def __init__(self, config: GestureConfig, resting_until_s: float) -> None:
         self._config = config
         self._phases = PhaseTracker(config)
-        self._stroke = StrokeGesture(config.settle_s)
+        self._stroke = self._new_stroke()
+        self._verdict = Verdict()
         self._resting_until_s = resting_until_s
         self._first_s: float | None = None
         self._leftness = 0.0
@@ -50,7 +54,12 @@ class Arm:
     @property
     def gesture(self) -> GestureKind:
         """Gesture of the stroke that the hand is in; `none` before it is decided and outside of strokes."""
-        return self._stroke.gesture
+        return self._verdict.gesture
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the rules say of the stroke so far."""
+        return self._verdict
 
     @property
     def side(self) -> Side | None:
@@ -77,10 +86,18 @@ class Arm:
         return math.dist(self._place_px, track.centroid_px)
 
     def update(
-        self, track: Track, face: Face, room: Point, time_s: float, frame_s: float, *, walking: bool, joined: bool
+        self,
+        track: Track,
+        face: Face,
+        room: Point,
+        time_s: float,
+        frame_s: float,
+        *,
+        walking: bool = False,
+        fellow: Point | None = None,
     ) -> None:
         """Advance by an observed hand; `room`: how far the room has moved in the picture, face widths; `frame_s`: time since
-        the frame before; `joined`: the other is held up beside it.
+        the frame before; `fellow`: where the person's other hand is about the face, face widths, none where it is not seen.
         """
         self.track_id, self.seen_s, self._place_px = track.track_id, time_s, track.centroid_px
         self._first_s = time_s if self._first_s is None else self._first_s
@@ -92,12 +109,32 @@ class Arm:
         phase = self._phases.update(time_s, in_room, place, walking)
         self.fingers = find_fingers(hand) if hand and phase != "idle" else []
         if phase != "stroke":
-            self._stroke = StrokeGesture(self._config.settle_s)
+            self._stroke, self._verdict = self._new_stroke(), Verdict()
             self._measures.clear()
         elif hand:
-            seen: Vote = "other" if joined else vote(hand, self.fingers)
-            self._stroke.add(time_s, seen, self._was_raised_before_us())
+            self._verdict = self._stroke.add(self._look(hand, time_s, fellow))
             self._measure(hand, time_s)
+
+    def _new_stroke(self) -> StrokeRules:
+        return PaperStroke(self._config.settle_s) if self._config.rules == "paper" else DeixisStroke(self._config)
+
+    def _look(self, hand: HandShape, time_s: float, fellow: Point | None) -> Look:
+        held = held_hand(hand, self.fingers, self.side, fellow)
+        return Look(
+            time_s,
+            hand,
+            tuple(self.fingers),
+            held,
+            self._phases.way,
+            may_be_invisible=self._was_raised_before_us(),
+            joined=self._is_joined(hand.centroid, fellow),
+        )
+
+    def _is_joined(self, place: Point, fellow: Point | None) -> bool:
+        """The other hand is held up near this one: signers, claps and explaining hands; a pointing is made with one hand."""
+        if fellow is None or fellow[1] > self._config.raised_below_face:
+            return False
+        return math.dist(place, fellow) <= self._config.hands_together
 
     def _measure(self, hand: HandShape, time_s: float) -> None:
         finger = self.fingers[0].length if self.fingers else 0.0

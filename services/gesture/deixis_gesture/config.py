@@ -5,6 +5,8 @@ One face width is `anatomy.FACE_WIDTH_M`, the width of a face's box in the track
 
 from __future__ import annotations
 
+from typing import Literal
+
 from deixis_runtime.settings import StageConfig
 from pydantic import Field
 
@@ -12,6 +14,12 @@ from pydantic import Field
 class GestureConfig(StageConfig):
     """When a hand gestures, and when a gesture is a pointing."""
 
+    rules: Literal["deixis", "paper"] = Field(
+        default="deixis",
+        description="What a stroke is: by the probability that it points, or by votes on its fingertips (paper, section 4).",
+    )
+    believed: float = Field(default=0.5, gt=0, lt=1, description="A stroke that points with this probability is a pointing.")
+    doubted: float = Field(default=0.35, gt=0, lt=1, description="A pointing is none any more below this probability.")
     still_speed: float = Field(
         default=1.3, gt=0, le=20, description="A hand slower than this is still, fw/s (0.045 fw a frame at 30 frames/s)."
     )

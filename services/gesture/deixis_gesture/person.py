@@ -71,6 +71,11 @@ class Person:
         self._arms: list[Arm] = []
         self._current: Arm | None = None
 
+    @property
+    def arms(self) -> Sequence[Arm]:
+        """The hands that are seen, or were a moment ago."""
+        return self._arms
+
     def is_gone(self, time_s: float) -> bool:
         """The face has been missing for too long."""
         return time_s - self._face_s > self._config.forget_s
@@ -88,8 +93,8 @@ class Person:
         walking = self._face_speed > self._config.walking_speed
         hands = [track for track in tracks if track.kind != "face" and track.observed and track.contour]
         for arm, track in self._assigned(hands, SAME_HAND * self._face.width_px):
-            joined = _is_joined(track, hands, self._face, self._config)
-            arm.update(track, self._face, self._room, time_s, frame_s, walking=walking, joined=joined)
+            fellow = _fellow(track, hands, self._face)
+            arm.update(track, self._face, self._room, time_s, frame_s, walking=walking, fellow=fellow)
         self._arms = [arm for arm in self._arms if time_s - arm.seen_s <= self._config.forget_s]
         self._current = self._gesturing()
         return self._spoken(self._current, self._face, view)
@@ -158,17 +163,19 @@ class Person:
             bearing_sigma_deg=bearing.sigma_deg if bearing else None,
             bearing_mirrored=bearing.mirrored if bearing else False,
             bearing_likelihood=list(bearing.likelihood) if bearing else [],
+            point_probability=arm.verdict.probability,
+            point_log_odds=dict(arm.verdict.log_odds),
         )
 
 
-def _is_joined(track: Track, hands: Sequence[Track], face: Face, config: GestureConfig) -> bool:
-    """Another hand is held up near this one: signers, claps and explaining hands; a pointing is made with one hand."""
-    near_px = config.hands_together * face.width_px
-    lowest_px = face.y_px + config.raised_below_face * face.width_px
-    return any(
-        other is not track and other.centroid_px[1] <= lowest_px and math.dist(other.centroid_px, track.centroid_px) <= near_px
-        for other in hands
-    )
+def _fellow(track: Track, hands: Sequence[Track], face: Face) -> tuple[float, float] | None:
+    """Where the person's other hand is about the face; of several the nearest to this one; none without any."""
+    others = [other.centroid_px for other in hands if other is not track]
+    if not others:
+        return None
+    near = min(others, key=lambda place: math.dist(place, track.centroid_px))
+    x, y = face.normalised([near])[0]
+    return float(x), float(y)
 
 
 def _bearing(arm: Arm, face: Face, view: View) -> Bearing | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
+from dataclasses import dataclass
 from itertools import combinations
 
 from deixis_schemas.messages import Phase
@@ -54,6 +55,15 @@ class Motion:
         return statistics.median(s[0] for s in slopes), statistics.median(s[1] for s in slopes)
 
 
+@dataclass(frozen=True)
+class Way:
+    """How a hand came from where it rested: how long that took, and how far up and aside it went about the face."""
+
+    seconds: float
+    up: float
+    aside: float
+
+
 class PhaseTracker:
     """Phase of one hand."""
 
@@ -65,6 +75,8 @@ class PhaseTracker:
         self.raised = False
         self._rest: tuple[float, float] | None = None
         self._last_s = 0.0
+        self._departure: tuple[float, tuple[float, float]] | None = None
+        self.way: Way | None = None
 
     def update(self, time_s: float, point: tuple[float, float], place: tuple[float, float], walking: bool) -> Phase:
         """Advance to `time_s`: hand at `point` (face widths, fixed to the room), at `place` about the face's centre."""
@@ -74,10 +86,25 @@ class PhaseTracker:
             self.raised = self._is_raised(place)
             outward = velocity[0] if place[0] > 0 else -velocity[0]
             leaving = max(-velocity[1], outward) if self._has_left_rest(point) else 0.0
+            before = self.phase
             self.phase = "idle" if walking and self.phase != "stroke" else self._following(*velocity, leaving)
+            self._follow_way(time_s, place, before)
             self.rose = self.phase == "preparation" or (self.rose and self.phase != "idle")
         self._follow_rest(time_s, point)
         return self.phase
+
+    def _follow_way(self, time_s: float, place: tuple[float, float], before: Phase) -> None:
+        """Remember where the hand rested last; when it stands, how it came from there."""
+        if self.phase == "idle":
+            self._departure = time_s, place
+        elif self.phase == "stroke" and before != "stroke":
+            self.way = self._way_to(time_s, place)
+
+    def _way_to(self, time_s: float, place: tuple[float, float]) -> Way | None:
+        if self._departure is None:
+            return None
+        began_s, rest = self._departure
+        return Way(time_s - began_s, rest[1] - place[1], abs(place[0]) - abs(rest[0]))
 
     def _has_left_rest(self, point: tuple[float, float]) -> bool:
         return self._rest is None or math.dist(self._rest, point) >= LEAVING_DISTANCE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from deixis_runtime.lens import Lens
 from deixis_schemas.messages import CameraMount, Gesture, Track
@@ -11,6 +11,7 @@ from deixis_schemas.runs import RunClock
 from .bearing import load_arms
 from .config import GestureConfig
 from .person import Person, View
+from .pointing_odds import frame_odds, stroke_odds
 
 LEVEL = CameraMount()
 
@@ -20,10 +21,16 @@ class GestureRecognizer:
 
     def __init__(self, config: GestureConfig) -> None:
         load_arms()  # now, not within the first pointing
+        frame_odds(), stroke_odds()
         self._config = config
         self._persons: dict[int, Person] = {}
         self._clock = RunClock()
         self._room_offset_px = (0.0, 0.0)
+
+    @property
+    def persons(self) -> Mapping[int, Person]:
+        """Who is followed, by `person_id`."""
+        return self._persons
 
     def update(
         self,

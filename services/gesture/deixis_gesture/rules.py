@@ -15,6 +15,7 @@ from deixis_schemas.messages import GestureKind
 
 from .fingertips import Finger
 from .hand import HandShape
+from .stroke import Look, Verdict
 
 Vote = Literal["point_left", "point_right", "invisible", "other", "unclear"]
 
@@ -116,16 +117,22 @@ def _pointing(hand: HandShape, finger: Finger) -> Vote:
     return "point_left" if x > 0 else "point_right"
 
 
-class StrokeGesture:
+class PaperStroke:
     """The gesture of one stroke, from the votes of its frames."""
 
     def __init__(self, settle_s: float) -> None:
         self._settle_s = settle_s
         self._votes: deque[tuple[float, Vote]] = deque(maxlen=256)
         self._began_s: float | None = None
-        self.gesture: GestureKind = "none"
+        self._gesture: GestureKind = "none"
 
-    def add(self, time_s: float, seen: Vote, may_be_invisible: bool) -> GestureKind:
+    def add(self, look: Look) -> Verdict:
+        """Count the vote of one more frame."""
+        seen: Vote = "other" if look.joined else vote(look.hand, look.fingers)
+        self.count(look.time_s, seen, look.may_be_invisible)
+        return Verdict(self._gesture)
+
+    def count(self, time_s: float, seen: Vote, may_be_invisible: bool) -> GestureKind:
         """Count a vote; `may_be_invisible`: the hand's history allows a pointing without a visible finger."""
         if self._began_s is None:
             self._began_s = time_s
@@ -133,14 +140,14 @@ class StrokeGesture:
             seen = "unclear"
         self._votes.append((time_s, seen))
         if time_s - self._began_s < self._settle_s:
-            return self.gesture
-        recent = [v for t, v in self._votes if self.gesture == "none" or time_s - t <= RECENT_S]
+            return self._gesture
+        recent = [v for t, v in self._votes if self._gesture == "none" or time_s - t <= RECENT_S]
         winner, share = _winner(recent)
-        refined = self.gesture == "invisible" and winner in ("point_left", "point_right")
+        refined = self._gesture == "invisible" and winner in ("point_left", "point_right")
         enough = REFINE_SHARE if refined else CHANGE_SHARE
-        if self.gesture == "none" or (share >= enough and time_s - self._began_s >= RECENT_S):
-            self.gesture = winner
-        return self.gesture
+        if self._gesture == "none" or (share >= enough and time_s - self._began_s >= RECENT_S):
+            self._gesture = winner
+        return self._gesture
 
 
 def _winner(votes: Sequence[Vote]) -> tuple[GestureKind, float]:
