@@ -6,7 +6,7 @@ Its numbers are not published. What the text says: columns sum to 1, success is 
 to 120 degrees; a head that cannot be read is "not computed". What table 3 says: of heads within the range 1 to 4 % do not lead
 to the right POI (C_f beside V_f), and POIs lie farther apart than a step of 10 degrees: so "not computed" is rare within the
 range, and the rest is neighbours.
-The straight lines between are a choice, made before any room was simulated.
+The straight line between is a choice. `python fitting/choose_paper.py` chose success at 120 degrees and how much is unread.
 """
 
 from __future__ import annotations
@@ -19,12 +19,10 @@ import numpy.typing as npt
 TARGET = Path(__file__).parents[1] / "services/fusion/deixis_fusion/fig_6.yaml"
 INTENDED = range(0, 190, 10)
 PERCEIVED = range(0, 130, 10)
-AT_FRONT, AT_LIMIT = 0.95, 0.55
+AT_FRONT, AT_LIMIT = 0.95, 0.6
 """Success at 0 and at 120 degrees."""
-UNREAD = 0.1
+UNREAD = 0.05
 """Part of the errors that are no neighbour but "not computed"."""
-BEYOND = {130: {120: 0.15, 110: 0.05}, 140: {120: 0.05}}
-"""Beyond the range some heads are still read, as the last angles; all else is "not computed"."""
 HEAD = """\
 # Figure 6 of Pateraki et al. 2011, P(perceived yaw | intended yaw), by size: left and right are alike. Its numbers are not
 # published: this is a reconstruction from what text and table 3 say, by `python fitting/reconstruct_fig_6.py` (see there).
@@ -33,21 +31,20 @@ source: reconstruction of figure 6, Pateraki et al. 2011, whose numbers are not 
 """
 
 
-def reconstructed() -> npt.NDArray[np.float64]:
-    """Shares (perceived + 1, intended); the last row is "not computed"."""
+def reconstructed(at_limit: float = AT_LIMIT, unread: float = UNREAD) -> npt.NDArray[np.float64]:
+    """Shares (perceived + 1, intended); the last row is "not computed", all that there is beyond the range (section 6.2)."""
     rows = {yaw: i for i, yaw in enumerate(PERCEIVED)}
     table = np.zeros((len(rows) + 1, len(INTENDED)))
     for column, intended in enumerate(INTENDED):
         if intended in rows:
-            success = AT_FRONT + (AT_LIMIT - AT_FRONT) * intended / max(PERCEIVED)
+            success = AT_FRONT + (at_limit - AT_FRONT) * intended / max(PERCEIVED)
             neighbours = [yaw for yaw in (intended - 10, intended + 10) if yaw in rows]
             table[rows[intended], column] = success
             for yaw in neighbours:
-                table[rows[yaw], column] = (1 - UNREAD) * (1 - success) / len(neighbours)
-        for yaw, share in BEYOND.get(intended, {}).items():
-            table[rows[yaw], column] = share
-        table[-1, column] = 1 - table[:-1, column].sum()
-    return table.round(4)
+                table[rows[yaw], column] = (1 - unread) * (1 - success) / len(neighbours)
+    table = table.round(4)
+    table[-1] = (1 - table.sum(axis=0)).round(4)
+    return table
 
 
 def main() -> int:

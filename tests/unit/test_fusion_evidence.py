@@ -7,7 +7,7 @@ import math
 import pytest
 from deixis_fusion.belief import BeliefAssignment, as_set
 from deixis_fusion.config import FusionConfig
-from deixis_fusion.confusion import table_1
+from deixis_fusion.confusion import fig_6, table_1
 from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Witness
 from deixis_fusion.fusion import rules_of
 from deixis_fusion.paper_rules import PaperRules, face_assignment, gesture_sets, largest_focal_sets
@@ -65,22 +65,28 @@ def head_masses(head: HeadObservation, *degrees: float) -> BeliefAssignment:
     return PaperRules(PAPER.paper, PAPER.confusion).head(head, seen(*degrees))
 
 
+def fig_6_share(perceived: int | None, intended: int) -> float:
+    """The number in the table; of none, that of the row "not computed"."""
+    column = fig_6().intended_deg.index(intended)
+    return (fig_6().not_computed if perceived is None else fig_6().table[fig_6().perceived_deg.index(perceived)])[column]
+
+
 def test_the_papers_head_not_computed_is_that_row_of_figure_6() -> None:
-    # At 0, 60 and 130 degrees .005, .025 and .8 of the heads are not computed, at 150 all.
     assignment = head_masses(HeadObservation(None), 0, 60, 130, -150)
-    total = 0.005 + 0.025 + 0.8 + 1
+    near, side, beyond = (fig_6_share(None, yaw) for yaw in (0, 60, 130))
+    total = near + side + beyond + 1
     assert assignment.masses == {
-        0b0001: pytest.approx(0.005 / total),
-        0b0010: pytest.approx(0.025 / total),
-        0b1100: pytest.approx(1.8 / total),
+        0b0001: pytest.approx(near / total),
+        0b0010: pytest.approx(side / total),
+        0b1100: pytest.approx((beyond + 1) / total),
     }
 
 
 def test_the_papers_head_is_read_between_the_columns_of_figure_6() -> None:
-    # Perceived 60: of a POI at 60 .75, at 65 half of .75 and .1275, at 120 none, to the other side none.
+    # 65 lies halfway between 60 and 70; nothing to the other side, nor far off, is read as 60.
+    at, between = fig_6_share(60, 60), (fig_6_share(60, 60) + fig_6_share(60, 70)) / 2
     masses = head_masses(HeadObservation(60.0, 3.0), 60, 65, 120, -60).singletons()
-    between = (0.75 + 0.1275) / 2
-    assert masses == pytest.approx([0.75 / (0.75 + between), between / (0.75 + between), 0, 0])
+    assert masses == pytest.approx([at / (at + between), between / (at + between), 0, 0])
 
 
 def test_a_yaw_that_no_poi_explains_is_vacuous() -> None:
@@ -90,11 +96,10 @@ def test_a_yaw_that_no_poi_explains_is_vacuous() -> None:
 @pytest.mark.parametrize("head", [HeadObservation(None, beyond_deg=100), HeadObservation(125, 3)])
 def test_the_papers_head_has_the_range_of_the_stage_that_read_it(head: HeadObservation) -> None:
     limit = 110 if head.yaw_deg is None else 130
-    # Of a reader that ends at 100, nearly all heads turned to 110 are not computed.
-    beyond = 0.8 if head.yaw_deg else 0.0417 + 0.5833 + 0.1875
-    total = 0.005 + 0.025 + 2 * beyond
-    masses = head_masses(head, 0, 60, limit, -limit).masses
-    assert masses[0b1100] == pytest.approx(2 * beyond / total, abs=2e-4)
+    # Of a reader that ends at 100, all heads are not computed that figure 6 reads as 110 or 120.
+    beyond = 1.0 if head.yaw_deg else fig_6_share(None, 110) + fig_6_share(110, 110) + fig_6_share(120, 110)
+    total = fig_6_share(None, 0) + fig_6_share(None, 60) + 2 * beyond
+    assert head_masses(head, 0, 60, limit, -limit).masses[0b1100] == pytest.approx(2 * beyond / total, abs=1e-4)
 
 
 def test_the_papers_choice_is_the_union_of_the_largest_focal_sets() -> None:
