@@ -16,6 +16,7 @@ from .evidence import HandObservation, HeadObservation, PointingGesture
 from .paper_rules import TABLE_1
 
 Values = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
 Curve = Values
 
 # Between whole degrees: so left and right are mirror images, also where they meet behind.
@@ -32,14 +33,23 @@ SIDE_BORDER_DEG = 3.0
 LEAST_OUT_OF_RANGE = 0.05
 
 
-def at(curves: Values, bearings_deg: Values) -> Values:
-    """Curves (c, 360) at any bearings (...), degrees, on a line between its values: (c, ...)."""
-    position = (bearings_deg - BEARINGS[0]) % FULL_CIRCLE_DEG
-    below = position.astype(np.intp)
-    share = position - below
-    closed = np.concatenate([curves, curves[:, :2]], axis=1)
-    low = closed[:, below]
-    return np.asarray(low + share * (closed[:, below + 1] - low))
+def at(curves: Values, bearings_deg: Singles) -> Singles:
+    """Curves (c, 360) at bearings (...) within -540 and 540 degrees, on a line between its values: (c, ...).
+
+    Raises IndexError for bearings further round.
+    """
+    # Three times round and a step to either side, looked up in: a modulo of each bearing takes longer than all else here.
+    single = curves.astype(np.float32)
+    around = np.concatenate([single[:, -1:], single, single, single, single[:, :1]], axis=1)
+    share = bearings_deg + np.float32(FULL_CIRCLE_DEG - BEARINGS[0] + 1)
+    below = share.astype(np.intp)
+    share -= below
+    told = np.empty((len(curves), *bearings_deg.shape), dtype=np.float32)
+    for i, values in enumerate(around):
+        np.take(np.diff(values), below, out=told[i], mode="raise")
+        told[i] *= share
+        told[i] += values.take(below)
+    return told
 
 
 def rise(x: Values, width: float) -> Values:

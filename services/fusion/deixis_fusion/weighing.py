@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,11 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from .config import HandConfig, HeadConfig
-from .curves import BEARINGS, at, hand_curve, head_curve
-from .evidence import Evidence, HandObservation, HeadObservation, View
+from .curves import Curve, at, hand_curve, head_curve
+from .evidence import Evidence, View
+from .localisation import PersonPlace
 from .sight import Sight
 
 Values = npt.NDArray[np.float64]
+
+# POIs at a time: what is reckoned on the way then stays in the processor's cache.
+AT_A_TIME = 1024
 
 
 class Weighing(NamedTuple):
@@ -52,33 +57,62 @@ def weigh(evidence: Evidence, seen: Sight, hand_config: HandConfig, head_config:
     The frames of a stroke err alike: what was seen from several places is one observation, and each counts by its share of it
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
-    told, best, floor = np.ones((2, *seen.bearings.cases.shape)), 1.0, 1.0
-    for view in evidence.views or (View(evidence.hand, evidence.head),):
-        curves = np.stack([_hand(view.hand, view.hand_share, hand_config), _head(view.head, view.head_share, head_config)])
-        bearings = seen.bearings if view.place is None else seen.seen_from(view.place)
-        told *= at(curves, bearings.cases)
-        best *= float(curves.max(axis=1).prod())
-        floor *= float(curves[1].min())
-    joint = told[0] * told[1]
-    return Weighing(told[0].mean(axis=0), told[1].mean(axis=0), joint.mean(axis=0), joint.max(axis=0) / best, floor)
+    told = [_Told.of(view, hand_config, head_config) for view in evidence.views or (View(evidence.hand, evidence.head),)]
+    best = math.prod(float(curve.max()) for view in told for curve in view.curves)
+    floor = math.prod(float(view.head.min()) for view in told if view.head is not None)
+    parts = [_part(told, seen, slice(start, start + AT_A_TIME)) for start in range(0, len(seen), AT_A_TIME)]
+    hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
+    return Weighing(hand, head, joint, most / best, floor)
 
 
-def shares(weights: Sequence[float]) -> list[float]:
-    """The weights, summing to 1; of none, none."""
-    total = sum(weights)
-    return [weight / total for weight in weights] if total > 0 else list(weights)
+class _Told(NamedTuple):
+    """What hand and head tell in one view, none where nothing."""
+
+    hand: Curve | None
+    head: Curve | None
+    place: PersonPlace | None
+
+    @staticmethod
+    def of(view: View, hand_config: HandConfig, head_config: HeadConfig) -> _Told:
+        """The curves of the view, each to the power of its part."""
+        return _Told(_hand(view, hand_config), _head(view, head_config), view.place)
+
+    @property
+    def curves(self) -> list[Curve]:
+        """Those that there are."""
+        return [curve for curve in (self.hand, self.head) if curve is not None]
 
 
-def _hand(hand: HandObservation | None, share: float, config: HandConfig) -> Values:
-    if hand is None or share <= 0:
-        return np.ones_like(BEARINGS)
-    return np.asarray(hand_curve(hand, config) ** (share * _trust(hand.agreement)))
+def _part(told: Sequence[_Told], seen: Sight, part: slice) -> Values:
+    """Of this part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
+    shape = seen.bearings.cases[:, part].shape
+    hand = head = np.ones(1, dtype=np.float32)
+    for view in told:
+        if not view.curves:
+            continue
+        cases = seen.bearings.cases[:, part] if view.place is None else seen.seen_from(view.place, part)
+        values = list(at(np.stack(view.curves), cases))
+        if view.head is not None:
+            head = values.pop() * head
+        if view.hand is not None:
+            hand = values.pop() * hand
+    joint = np.broadcast_to(hand * head, shape)
+    means = [np.broadcast_to(likelihoods, shape).mean(axis=0) for likelihoods in (hand, head, joint)]
+    return np.array([*means, joint.max(axis=0)], dtype=np.float64)
 
 
-def _head(head: HeadObservation | None, share: float, config: HeadConfig) -> Values:
-    if head is None or share <= 0:
-        return np.ones_like(BEARINGS)
-    return np.asarray(head_curve(head, config) ** (share * _trust(head.agreement)))
+def _hand(view: View, config: HandConfig) -> Curve | None:
+    """What the hand tells in one view, to the power of its part; none where it tells nothing."""
+    if view.hand is None or view.hand_share <= 0:
+        return None
+    return np.asarray(hand_curve(view.hand, config) ** (view.hand_share * _trust(view.hand.agreement)))
+
+
+def _head(view: View, config: HeadConfig) -> Curve | None:
+    """What the head tells in one view, to the power of its part; none where it tells nothing."""
+    if view.head is None or view.head_share <= 0:
+        return None
+    return np.asarray(head_curve(view.head, config) ** (view.head_share * _trust(view.head.agreement)))
 
 
 def _trust(agreement: float) -> float:
