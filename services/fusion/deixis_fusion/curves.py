@@ -34,21 +34,23 @@ LEAST_OUT_OF_RANGE = 0.05
 
 
 def at(curves: Values, bearings_deg: Singles) -> Singles:
-    """Curves (c, 360) at bearings (...) within -540 and 540 degrees, on a line between its values: (c, ...).
+    """Curves (c, v, 360), each v at bearings of its own (v, ...), on a line between its values: (c, v, ...).
 
-    Raises IndexError for bearings further round.
+    Bearings lie within -540 and 540 degrees.
     """
     # Three times round and a step to either side, looked up in: a modulo of each bearing takes longer than all else here.
     single = curves.astype(np.float32)
-    around = np.concatenate([single[:, -1:], single, single, single, single[:, :1]], axis=1)
+    around = np.concatenate([single[..., -1:], single, single, single, single[..., :1]], axis=-1)
+    steps = np.diff(around, append=around[..., -1:])
     share = bearings_deg + np.float32(FULL_CIRCLE_DEG - BEARINGS[0] + 1)
     below = share.astype(np.intp)
     share -= below
+    below += np.arange(0, steps[0].size, steps.shape[-1]).reshape(-1, *(1,) * (below.ndim - 1))
     told = np.empty((len(curves), *bearings_deg.shape), dtype=np.float32)
-    for i, values in enumerate(around):
-        np.take(np.diff(values), below, out=told[i], mode="raise")
+    for i in range(len(curves)):
+        told[i] = steps[i].ravel().take(below)
         told[i] *= share
-        told[i] += values.take(below)
+        told[i] += around[i].ravel().take(below)
     return told
 
 

@@ -81,9 +81,11 @@ class Sight(Sequence[Candidate]):
         points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 2)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
-    def seen_from(self, place: PersonPlace, part: slice) -> Singles:
-        """The bearings of a part of these POIs from another place, in all cases (CASES, n)."""
-        return cases_from(place, self.points, self.chosen[part])
+    def cases_from(self, places: Sequence[PersonPlace], part: slice) -> Singles:
+        """Bearings of a part of these POIs in all cases (v, CASES, n): from these v places, or from where they are seen now."""
+        if not places:
+            return self.bearings.cases[None, :, part]
+        return _cases(places, _Turned.of(places, self.points, self.chosen[part]))
 
     def poi(self, i: int) -> Poi:
         """The i-th POI in sight."""
@@ -133,24 +135,26 @@ class Lookout:
 
 
 class _Turned(NamedTuple):
-    """POIs in the plane, turned so that the person sees the camera at 0: metres ahead and to the left of the camera (n), and
-    how far they are from the person and across (n); the person's distance from the camera.
+    """POIs as seen from v places, turned so that each person sees the camera at 0: metres ahead and to the left of the camera,
+    how far they are from the person (v, n) and across (n); the person's distance from the camera (v, 1).
     """
 
     ahead: Values
     left: Values
     away: Values
     extent: Values
-    distance: float
+    distance: Values
 
     @staticmethod
-    def of(place: PersonPlace, points: Points, index: Indices) -> _Turned:
-        """These POIs for a person there."""
-        camera_x, camera_y = place.camera_m[:2]
-        back_x, back_y = place.position_m[0] - camera_x, place.position_m[1] - camera_y
-        distance = math.hypot(back_x, back_y)
-        cos, sin = (-back_x / distance, -back_y / distance) if distance else (1.0, 0.0)
-        x, y = points.xy[index, 0] - camera_x, points.xy[index, 1] - camera_y
+    def of(places: Sequence[PersonPlace], points: Points, index: Indices) -> _Turned:
+        """These POIs for persons there."""
+        camera = np.array([place.camera_m[:2] for place in places])
+        back = np.array([place.position_m[:2] for place in places]) - camera
+        distance = np.hypot(back[:, 0], back[:, 1])[:, None]
+        ways = np.divide(-back, distance, out=np.tile((1.0, 0.0), (len(places), 1)), where=distance > 0)
+        cos, sin = ways[:, :1], ways[:, 1:]
+        xy = points.xy[index]
+        x, y = xy[:, 0] - camera[:, :1], xy[:, 1] - camera[:, 1:]
         ahead, left = cos * x + sin * y, cos * y - sin * x
         away = np.maximum(np.hypot(ahead + distance, left), LEAST_AWAY_M)
         return _Turned(ahead, left, away, points.extent[index], distance)
@@ -161,30 +165,27 @@ def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearing
 
     From the direction person -> camera, counter-clockwise from above (REP-103).
     """
-    turned = _Turned.of(place, points, index)
-    likeliest = np.degrees(np.arctan2(turned.left, turned.ahead + turned.distance))
-    across = np.hypot(place.sigma_m * turned.left / turned.away, turned.extent / math.sqrt(12))
-    sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, turned.away)))
-    return Bearings(likeliest, sigma, _cases(place, turned))
+    turned = _Turned.of([place], points, index)
+    left, away = turned.left[0], turned.away[0]
+    likeliest = np.degrees(np.arctan2(left, turned.ahead[0] + turned.distance[0]))
+    across = np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12))
+    sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, away)))
+    return Bearings(likeliest, sigma, _cases([place], turned)[0])
 
 
-def cases_from(place: PersonPlace, points: Points, index: Indices) -> Singles:
-    """Bearings of these POIs at the person in all cases alone (CASES, n), degrees."""
-    return _cases(place, _Turned.of(place, points, index))
+def _cases(places: Sequence[PersonPlace], turned: _Turned) -> Singles:
+    """Bearings from v places in all cases (v, CASES, n).
 
-
-def _cases(place: PersonPlace, turned: _Turned) -> Singles:
-    """In all cases the person stands on the line through camera and head, which the picture tells well; how far along it, is
-    known to `place.sigma_m`.
-
+    In each the person stands on the line through camera and head, which the picture tells well; how far along it, is known to
+    `place.sigma_m`.
     In single precision, a hundred thousandth of a degree: half as many bytes, of the most there is to reckon.
     """
-    relative = place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0
-    steps = (turned.distance * np.exp(relative * DISTANCE_ERRORS)).astype(np.float32)
+    relative = np.array([place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0 for place in places])
+    steps = (turned.distance * np.exp(relative[:, None] * DISTANCE_ERRORS)).astype(np.float32)
     # The angle of a part of the POI, for small angles; a POI that one stands in lies anywhere.
     wide = np.degrees(np.minimum(turned.extent / turned.away, math.pi / 2)).astype(np.float32)
-    bearings = turned.ahead.astype(np.float32) + steps[:, None]
-    np.arctan2(turned.left.astype(np.float32), bearings, out=bearings)
+    bearings = turned.ahead.astype(np.float32)[:, None, :] + steps[:, :, None]
+    np.arctan2(turned.left.astype(np.float32)[:, None, :], bearings, out=bearings)
     bearings *= np.float32(math.degrees(1))
-    bearings += ACROSS[:, None] * wide
+    bearings += ACROSS[:, None] * wide[:, None, :]
     return bearings

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .config import HandConfig, HeadConfig
-from .curves import Curve, at, hand_curve, head_curve
-from .evidence import Evidence, View
-from .localisation import PersonPlace
+from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
+from .evidence import Evidence, HandObservation, HeadObservation, View
 from .sight import Sight
 
 Values = npt.NDArray[np.float64]
 
-# POIs at a time: what is reckoned on the way then stays in the processor's cache.
+NOTHING: Curve = np.zeros_like(BEARINGS)
+# POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 1024
 
 
@@ -57,62 +59,56 @@ def weigh(evidence: Evidence, seen: Sight, hand_config: HandConfig, head_config:
     The frames of a stroke err alike: what was seen from several places is one observation, and each counts by its share of it
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
-    told = [_Told.of(view, hand_config, head_config) for view in evidence.views or (View(evidence.hand, evidence.head),)]
-    best = math.prod(float(curve.max()) for view in told for curve in view.curves)
-    floor = math.prod(float(view.head.min()) for view in told if view.head is not None)
-    parts = [_part(told, seen, slice(start, start + AT_A_TIME)) for start in range(0, len(seen), AT_A_TIME)]
+    views = evidence.views or (View(evidence.hand, evidence.head),)
+    curves = {"hand": _hands(views, hand_config), "head": _heads(views, head_config)}
+    told = {name: of_views for name, of_views in curves.items() if of_views is not None}
+    if not told:
+        even = np.ones(len(seen))
+        return Weighing(even, even, even, even)
+    places = [view.place for view in views if view.place is not None]
+    at_a_time = max(1, AT_A_TIME // len(views))
+    parts = [_part(told, seen.cases_from(places, slice(start, start + at_a_time))) for start in range(0, len(seen), at_a_time)]
     hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
+    best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
+    floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
     return Weighing(hand, head, joint, most / best, floor)
 
 
-class _Told(NamedTuple):
-    """What hand and head tell in one view, none where nothing."""
-
-    hand: Curve | None
-    head: Curve | None
-    place: PersonPlace | None
-
-    @staticmethod
-    def of(view: View, hand_config: HandConfig, head_config: HeadConfig) -> _Told:
-        """The curves of the view, each to the power of its part."""
-        return _Told(_hand(view, hand_config), _head(view, head_config), view.place)
-
-    @property
-    def curves(self) -> list[Curve]:
-        """Those that there are."""
-        return [curve for curve in (self.hand, self.head) if curve is not None]
+def _part(told: Mapping[str, Values], cases: Singles) -> Values:
+    """Of a part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
+    likelihoods = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
+    joint = np.asarray(math.prod(likelihoods.values()))
+    means = [likelihoods[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
+    return np.array([*means, joint.mean(axis=0), joint.max(axis=0)], dtype=np.float64)
 
 
-def _part(told: Sequence[_Told], seen: Sight, part: slice) -> Values:
-    """Of this part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
-    shape = seen.bearings.cases[:, part].shape
-    hand = head = np.ones(1, dtype=np.float32)
-    for view in told:
-        if not view.curves:
-            continue
-        cases = seen.bearings.cases[:, part] if view.place is None else seen.seen_from(view.place, part)
-        values = list(at(np.stack(view.curves), cases))
-        if view.head is not None:
-            head = values.pop() * head
-        if view.hand is not None:
-            hand = values.pop() * hand
-    joint = np.broadcast_to(hand * head, shape)
-    means = [np.broadcast_to(likelihoods, shape).mean(axis=0) for likelihoods in (hand, head, joint)]
-    return np.array([*means, joint.max(axis=0)], dtype=np.float64)
-
-
-def _hand(view: View, config: HandConfig) -> Curve | None:
-    """What the hand tells in one view, to the power of its part; none where it tells nothing."""
-    if view.hand is None or view.hand_share <= 0:
+def _hands(views: Sequence[View], config: HandConfig) -> Values | None:
+    """What the hand tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
+    shares = [view.hand_share * _trust(view.hand.agreement) if view.hand else 0.0 for view in views]
+    if not any(shares):
         return None
-    return np.asarray(hand_curve(view.hand, config) ** (view.hand_share * _trust(view.hand.agreement)))
+    logs = [_log_of_hand(replace(view.hand, agreement=1.0), config) if view.hand else NOTHING for view in views]
+    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
 
 
-def _head(view: View, config: HeadConfig) -> Curve | None:
-    """What the head tells in one view, to the power of its part; none where it tells nothing."""
-    if view.head is None or view.head_share <= 0:
+def _heads(views: Sequence[View], config: HeadConfig) -> Values | None:
+    """What the head tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
+    shares = [view.head_share * _trust(view.head.agreement) if view.head else 0.0 for view in views]
+    if not any(shares):
         return None
-    return np.asarray(head_curve(view.head, config) ** (view.head_share * _trust(view.head.agreement)))
+    logs = [_log_of_head(replace(view.head, agreement=1.0), config) if view.head else NOTHING for view in views]
+    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
+
+
+# Of a walk only the last view changes from frame to frame.
+@lru_cache(maxsize=256)
+def _log_of_hand(hand: HandObservation, config: HandConfig) -> Curve:
+    return np.log(hand_curve(hand, config))
+
+
+@lru_cache(maxsize=256)
+def _log_of_head(head: HeadObservation, config: HeadConfig) -> Curve:
+    return np.log(head_curve(head, config))
 
 
 def _trust(agreement: float) -> float:
