@@ -107,6 +107,11 @@ class Sight(Sequence[Candidate]):
         return (self[i] for i in range(len(self)))
 
 
+def poi_at(seen: Sequence[Candidate], i: int) -> Poi:
+    """The i-th POI of those that are seen; of a sight without a candidate made for it."""
+    return seen.poi(i) if isinstance(seen, Sight) else seen[i].poi
+
+
 class Lookout:
     """The POIs in sight of one person, from frame to frame. Sight lines are kept while the person stands still."""
 

@@ -20,7 +20,7 @@ Values = npt.NDArray[np.float64]
 
 NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
-AT_A_TIME = 1024
+AT_A_TIME = 4096
 
 
 class Weighing(NamedTuple):
