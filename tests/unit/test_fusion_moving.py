@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.evidence import Sample
+from deixis_fusion.frames import Frames
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.hand_evidence import hand_over
 from deixis_fusion.head_evidence import head_over
@@ -131,7 +133,7 @@ def sample(frame: int, axis_deg: float, bearing: float, person: Spot = (0.0, 0.0
 
 
 def test_a_ray_stays_where_it_is_in_the_map_while_the_camera_goes_round() -> None:
-    weighed = [(sample(i, axis_deg=i, bearing=wrapped(170 - i)), 1.0) for i in range(40)]
+    weighed = Frames.of([sample(i, axis_deg=i, bearing=wrapped(170 - i)) for i in range(40)])
     hand, head = hand_over(weighed, 39), head_over(weighed, 39)
     assert hand is not None
     assert head is not None
@@ -141,9 +143,9 @@ def test_a_ray_stays_where_it_is_in_the_map_while_the_camera_goes_round() -> Non
 
 def test_what_is_behind_and_what_is_before_come_apart_when_the_camera_goes_round() -> None:
     # Behind at 120 as seen first; the stage names the one in front, or the other, as it comes.
-    weighed = [
-        (sample(i, axis_deg=i, bearing=(120 - i) if i % 2 else 180 - (120 - i), bearing_mirrored=True), 1.0) for i in range(40)
-    ]
+    weighed = Frames.of(
+        [sample(i, axis_deg=i, bearing=(120 - i) if i % 2 else 180 - (120 - i), bearing_mirrored=True) for i in range(40)]
+    )
     hand = hand_over(weighed, 39)
     assert hand is not None
     sigmas = {round(bearing): sigma for bearing, sigma in hand.bearings}
@@ -155,21 +157,21 @@ def test_a_curve_of_bearings_turns_with_the_camera() -> None:
     def curve(peak: float) -> list[float]:
         return [math.exp(-0.5 * (wrapped(-180 + 5 * i - peak) / 12) ** 2) for i in range(72)]
 
-    weighed = [(sample(i, 2 * i, 60 - 2 * i, bearing_likelihood=curve(60 - 2 * i)), 1.0) for i in range(20)]
+    weighed = Frames.of([sample(i, 2 * i, 60 - 2 * i, bearing_likelihood=curve(60 - 2 * i)) for i in range(20)])
     hand = hand_over(weighed, 38)
     assert hand is not None
     assert hand.likelihood == pytest.approx(curve(22), abs=0.03)
 
 
 def test_angles_are_one_cluster_wherever_the_circle_is_cut() -> None:
-    assert median_angle([(angle, 1.0) for angle in (178, 179, -179, -178, 180)]) == (
+    assert median_angle(np.array([178.0, 179, -179, -178, 180]), np.ones(5)) == (
         pytest.approx(-180),
         pytest.approx(1.48, abs=0.1),
     )
 
 
 def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
-    weighed = [(sample(i, 180, 60, person=(0.0, 0.05 * i)), 1.0) for i in range(150)]
+    weighed = Frames.of([sample(i, 180, 60, person=(0.0, 0.05 * i)) for i in range(150)])
     views = views_of(weighed, hand_over(weighed), head_over(weighed))
     assert 2 < len(views) <= MOST_VIEWS
     assert sum(view.hand_share for view in views) == pytest.approx(1)
@@ -177,5 +179,5 @@ def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
 
 
 def test_who_stands_is_seen_from_one_place() -> None:
-    weighed = [(sample(i, i, 60 - i, person=(0.0, 0.01 * (i % 3))), 1.0) for i in range(150)]
+    weighed = Frames.of([sample(i, i, 60 - i, person=(0.0, 0.01 * (i % 3))) for i in range(150)])
     assert views_of(weighed, hand_over(weighed), head_over(weighed)) == ()

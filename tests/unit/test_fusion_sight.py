@@ -101,7 +101,7 @@ def test_in_a_case_all_pois_are_seen_from_one_place() -> None:
         distance = 3 * math.exp(0.5 / here.distance_m * DISTANCE_ERRORS[case])
         there = place(distance, 0)
         expected = [bearing_deg(there, (*xy, 1.0)) for xy in ((3, -1), (3, -2), (2, 1))]
-        assert bearings.cases[case] == pytest.approx(expected, abs=1e-6)
+        assert bearings.cases[case] == pytest.approx(expected, abs=1e-4)
 
 
 def test_a_wide_poi_may_be_meant_anywhere_on_it() -> None:

@@ -17,6 +17,7 @@ from .evidence import HandObservation, HeadObservation
 from .pointing import PointingGesture
 
 Values = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
 Curve = Values
 
 # Between whole degrees: so left and right are mirror images, also where they meet behind.
@@ -33,14 +34,25 @@ SIDE_BORDER_DEG = 3.0
 LEAST_OUT_OF_RANGE = 0.05
 
 
-def at(curves: Values, bearings_deg: Values) -> Values:
-    """Curves (c, 360) at any bearings (...), degrees, on a line between its values: (c, ...)."""
-    position = (bearings_deg - BEARINGS[0]) % FULL_CIRCLE_DEG
-    below = position.astype(np.intp)
-    share = position - below
-    closed = np.concatenate([curves, curves[:, :2]], axis=1)
-    low = closed[:, below]
-    return np.asarray(low + share * (closed[:, below + 1] - low))
+def at(curves: Values, bearings_deg: Singles) -> Singles:
+    """Curves (c, v, 360), each v at bearings of its own (v, ...), on a line between its values: (c, v, ...).
+
+    Bearings lie within -540 and 540 degrees.
+    """
+    # Three times round and a step to either side, looked up in: a modulo of each bearing takes longer than all else here.
+    single = curves.astype(np.float32)
+    around = np.concatenate([single[..., -1:], single, single, single, single[..., :1]], axis=-1)
+    steps = np.diff(around, append=around[..., -1:])
+    share = bearings_deg + np.float32(FULL_CIRCLE_DEG - BEARINGS[0] + 1)
+    below = share.astype(np.intp)
+    share -= below
+    below += np.arange(0, steps[0].size, steps.shape[-1]).reshape(-1, *(1,) * (below.ndim - 1))
+    told = np.empty((len(curves), *bearings_deg.shape), dtype=np.float32)
+    for i in range(len(curves)):
+        told[i] = steps[i].ravel().take(below)
+        told[i] *= share
+        told[i] += around[i].ravel().take(below)
+    return told
 
 
 def rise(x: Values, width: float) -> Values:

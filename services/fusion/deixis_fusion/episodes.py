@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from .config import EpisodesConfig
 from .evidence import Sample
 
+FORGOTTEN_EVERY_S = 0.5
+
 
 @dataclass
 class Stroke:
@@ -98,7 +100,8 @@ class EpisodeTracker:
         self.stroke.samples.append(sample)
         self.stroke.sides[sample.pointing or ""] += 1
         oldest_ns = sample.at_ns - self._config.max_evidence_s * 1e9
-        if self.stroke.samples[0].at_ns < oldest_ns:
+        # Now and then: where the person was at first is where the views of a walk begin (`views.py`).
+        if self.stroke.samples[0].at_ns < oldest_ns - FORGOTTEN_EVERY_S * 1e9:
             self.stroke.samples = [kept for kept in self.stroke.samples if kept.at_ns >= oldest_ns]
 
     def _open_if_long_enough(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,10 +19,21 @@ from .pointing import PointingGesture
 Values = npt.NDArray[np.float64]
 StageStatus = tuple[SourceStatus, str]
 
+NAN = math.nan
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
 
 
-@dataclass(frozen=True)
+# What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
+# `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
+_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored")
+_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg")
+_OF_PLACE = ("axis_deg", "x_m", "y_m")
+ROW = {name: i for i, name in enumerate((*_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
+SIDES: tuple[Side, ...] = ("left", "right")
+STATUSES = ("tracking", "out_of_range")
+
+
+@dataclass(frozen=True, eq=False)
 class Sample:
     """One frame of one person: what gesture and headpose said of the person, none where they said nothing.
 
@@ -41,6 +54,35 @@ class Sample:
             return None
         return next((kind for kind in POINTING if kind == self.gesture.gesture), None)
 
+    @cached_property
+    def row(self) -> bytes:
+        """What the frame shows in numbers: `ROW`, packed."""
+        return struct.pack(f"{len(ROW)}d", *self._of_hand(), *self._of_head(), *self._of_place())
+
+    def _of_hand(self) -> tuple[float, ...]:
+        told = self.gesture
+        if told is None:
+            return (NAN,) * len(_OF_HAND)
+        mirrored = float(told.bearing_mirrored)
+        return (
+            _place_in(POINTING, self.pointing),
+            _place_in(SIDES, told.hand),
+            *_known(told.bearing_deg, told.bearing_sigma_deg),
+            mirrored,
+        )
+
+    def _of_head(self) -> tuple[float, ...]:
+        told = self.pose
+        if told is None:
+            return (NAN,) * len(_OF_HEAD)
+        status, side = _place_in(STATUSES, told.status), _place_in(SIDES, told.side)
+        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg)
+
+    def _of_place(self) -> tuple[float, ...]:
+        if self.place is None:
+            return (NAN,) * len(_OF_PLACE)
+        return self.place.axis_deg, *self.place.position_m[:2]
+
     @property
     def unclear(self) -> bool:
         """A stroke whose gesture could not be told."""
@@ -57,14 +99,13 @@ class Sample:
         told = self.gesture.bearing_likelihood if self.gesture is not None else ()
         return np.array(told) if told else None
 
-    def turn_to(self, axis_deg: float | None) -> float:
-        """What is added to a bearing seen then, to have it from the direction `axis_deg` in the map; degrees."""
-        if axis_deg is None or self.place is None:
-            return 0.0
-        return wrapped_deg(self.place.axis_deg - axis_deg)
+
+def _place_in(all_there_are: Sequence[str], one: str | None) -> float:
+    return float(all_there_are.index(one)) if one in all_there_are else NAN
 
 
-Weighed = Sequence[tuple[Sample, float]]
+def _known(*values: float | None) -> tuple[float, ...]:
+    return tuple(NAN if value is None else value for value in values)
 
 
 @dataclass(frozen=True)

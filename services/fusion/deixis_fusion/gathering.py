@@ -51,16 +51,16 @@ def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Wi
     """A stage that is dead counts for nothing from then on. One that is only late counts by what it said a moment ago."""
     gesture, headpose = stages[GESTURE], stages[HEADPOSE]
     posed = [sample for sample in stroke if sample.pose is not None]
-    weighed, place = weigh(stroke, config.settle_s), last_place(stroke)
+    frames, place = weigh(stroke, config.settle_s), last_place(stroke)
     axis_deg = place.axis_deg if place is not None else None
     hand, head = None, None
     if _counts(gesture, stroke, latest, config):
-        hand = hand_over(weighed, axis_deg)
+        hand = hand_over(frames, axis_deg)
         gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
     if _counts(headpose, posed, latest, config):
-        head = head_over(weighed, axis_deg)
+        head = head_over(frames, axis_deg)
         headpose = _head_witness(head, stroke[-1].pose, headpose, posed[-1].stamp_ns if posed else None)
-    return Evidence(hand, gesture, head, headpose, views_of(weighed, hand, head))
+    return Evidence(hand, gesture, head, headpose, views_of(frames, hand, head))
 
 
 def _counts(stage: Witness, told: Sequence[Sample], latest: Sample, config: EpisodesConfig) -> bool:

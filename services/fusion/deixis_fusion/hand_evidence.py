@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
-from .evidence import POINTING, HandObservation, Sample, Values, Weighed
+from .evidence import POINTING, SIDES, HandObservation, Sample
+from .frames import Frames, Values
 from .pointing import PointingGesture
 from .robust import majority, median, median_angle
 
@@ -18,54 +19,48 @@ DIRECTED_SHARE = 0.3
 SAME_AXIS_DEG = 1.0
 
 
-def hand_over(weighed: Weighed, axis_deg: float | None = None) -> HandObservation | None:
-    """The pointing hand over a stroke; none without a pointing sample.
+def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation | None:
+    """The pointing hand over a stroke; none without a pointing frame.
 
     Bearings are from the direction `axis_deg` in the map, whichever way the camera was when each was seen; without it, from the
     direction to the camera in each frame.
     """
-    weighted = [(sample, weight) for sample, weight in weighed if sample.pointing]
-    if not weighted:
+    kinds = frames.column("kind")
+    pointing = ~np.isnan(kinds)
+    if not pointing.any():
         return None
-    gesture, agreement = _vote(weighted)
-    own = [(sample, weight) for sample, weight in weighted if gesture in (sample.pointing, "invisible")]
-    hand = majority([(s.gesture.hand, w) for s, w in own if s.gesture is not None and s.gesture.hand is not None])
-    told = [(s, w) for s, w in own if s.gesture is not None and s.gesture.bearing_deg is not None]
-    if not told:
+    gesture, agreement = _vote(kinds[pointing], frames.weights[pointing])
+    own = pointing if gesture == "invisible" else kinds == POINTING.index(gesture)
+    side = majority(frames.column("hand")[own], frames.weights[own])
+    hand = None if side is None else SIDES[side]
+    told = own & ~np.isnan(frames.column("bearing_deg"))
+    if not told.any():
         return HandObservation(gesture, agreement=agreement, hand=hand)
-    mirrored = bool(majority([(s.gesture.bearing_mirrored, w) for s, w in told if s.gesture]))
-    stated = median([(s.gesture.bearing_sigma_deg or 0.0, w) for s, w in told if s.gesture])
-    bearing, spread = median_angle([(_bearing(s, mirrored) + s.turn_to(axis_deg), w) for s, w in told])
-    mirror = None
+    weights, turns, seen = frames.weights[told], frames.turns_to(axis_deg)[told], frames.column("bearing_deg")[told]
+    mirrored, mirror = bool(majority(frames.column("mirrored")[told], weights)), None
+    stated = median(frames.column("bearing_sigma_deg")[told], weights)
     if mirrored:
+        seen = _in_front(seen)
         # Front and back turn against each other as the camera moves: what was meant stays where it is in the map.
-        other, spread_of_other = median_angle([(180 - _bearing(s, mirrored) + s.turn_to(axis_deg), w) for s, w in told])
+        other, spread_of_other = median_angle(180 - seen + turns, weights)
         mirror = (other, math.hypot(stated, spread_of_other))
-    curve = _mean_curve(told, axis_deg)
+    bearing, spread = median_angle(seen + turns, weights)
+    curve = _mean_curve([frames.samples[int(i)] for i in np.flatnonzero(told)], weights, turns)
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
 
 
-def _bearing(sample: Sample, mirrored: bool) -> float:
-    """The bearing as seen from the camera; of two that it may be, the one in front of the person."""
-    bearing = (sample.gesture.bearing_deg if sample.gesture else None) or 0.0
-    return _in_front(bearing) if mirrored else bearing
-
-
-def _mean_curve(told: Weighed, axis_deg: float | None) -> tuple[float, ...]:
+def _mean_curve(samples: Sequence[Sample], weights: Values, turns_deg: Values) -> tuple[float, ...]:
     """Of the frames together: their mean, for they show nearly the same, and where they differ either may be right."""
-    turns: dict[int, list[tuple[Values, float]]] = {}
-    for sample, weight in told:
-        if sample.curve is not None:
-            turns.setdefault(round(sample.turn_to(axis_deg) / SAME_AXIS_DEG), []).append((sample.curve, weight))
-    if not turns:
+    curves = [sample.curve for sample in samples if sample.curve is not None]
+    if not curves:
         return ()
-    sums = [_turned(_sum(curves), turn * SAME_AXIS_DEG) for turn, curves in turns.items()]
-    total = math.fsum(weight for curves in turns.values() for _, weight in curves)
-    return tuple((np.sum(sums, axis=0) / total).tolist())
-
-
-def _sum(curves: Sequence[tuple[Values, float]]) -> Values:
-    return np.asarray(np.array([weight for _, weight in curves]) @ np.array([curve for curve, _ in curves]))
+    with_curve = np.array([sample.curve is not None for sample in samples])
+    weights, steps = weights[with_curve], np.round(turns_deg[with_curve] / SAME_AXIS_DEG)
+    stacked, total = np.array(curves), np.zeros(BEARINGS)
+    for step in np.unique(steps):
+        same = steps == step
+        total += _turned(weights[same] @ stacked[same], step * SAME_AXIS_DEG)
+    return tuple((total / weights.sum()).tolist())
 
 
 def _turned(curve: Values, turn_deg: float) -> Values:
@@ -76,21 +71,17 @@ def _turned(curve: Values, turn_deg: float) -> Values:
     return np.asarray(np.interp(steps, np.arange(BEARINGS), curve, period=BEARINGS))
 
 
-def _vote(weighted: Weighed) -> tuple[PointingGesture, float]:
+def _vote(kinds: Values, weights: Values) -> tuple[PointingGesture, float]:
     """The gesture that most frames saw, and its share. A finger seen now and then outweighs "invisible"."""
-    votes: dict[PointingGesture, float] = dict.fromkeys(POINTING, 0.0)
-    for sample, weight in weighted:
-        if sample.pointing:
-            votes[sample.pointing] += weight
-    total = math.fsum(votes.values())
+    votes = dict(zip(POINTING, np.bincount(kinds.astype(np.intp), weights, len(POINTING)).tolist(), strict=True))
+    total = sum(votes.values())
     directed: PointingGesture = "point_left" if votes["point_left"] >= votes["point_right"] else "point_right"
     if votes[directed] >= DIRECTED_SHARE * total:
         return directed, votes[directed] / (votes["point_left"] + votes["point_right"])
     return "invisible", votes["invisible"] / total
 
 
-def _in_front(bearing: float) -> float:
-    """The one of b and 180 - b that lies in front of the person, within -90 and 90."""
-    if abs(bearing) <= 90:
-        return bearing
-    return math.copysign(180 - abs(bearing), bearing)
+def _in_front(bearings_deg: Values) -> Values:
+    """Of each b and 180 - b the one that lies in front of the person, within -90 and 90."""
+    size = np.abs(bearings_deg)
+    return np.where(size <= 90, bearings_deg, np.copysign(180 - size, bearings_deg))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from deixis_schemas.messages import HeadPose
 
-from .evidence import HeadObservation, Weighed
+from .evidence import SIDES, STATUSES, HeadObservation
+from .frames import Flags, Frames
 from .robust import majority, median, median_angle
 
 LEAST_HEAD_SHARE = 0.2
@@ -21,23 +23,29 @@ def head_now(pose: HeadPose | None) -> HeadObservation | None:
     return HeadObservation(pose.yaw_deg, pose.yaw_sigma_deg, pose.side)
 
 
-def head_over(weighed: Weighed, axis_deg: float | None = None) -> HeadObservation | None:
+def head_over(frames: Frames, axis_deg: float | None = None) -> HeadObservation | None:
     """The head over a stroke; none where it was tracked in too few frames to tell.
 
     The yaw is from the direction `axis_deg` in the map, whichever way the camera was when it was seen; without it, from the
     direction to the camera in each frame.
     """
-    total = math.fsum(weight for _, weight in weighed)
-    tracked = [(s, w) for s, w in weighed if s.pose is not None and s.pose.status == "tracking"]
-    beyond = [(s.pose, w) for s, w in weighed if s.pose is not None and s.pose.status == "out_of_range"]
-    tracked_share = math.fsum(weight for _, weight in tracked) / total if total else 0.0
-    beyond_share = math.fsum(weight for _, weight in beyond) / total if total else 0.0
+    total, status = float(frames.weights.sum()), frames.column("status")
+    tracked, beyond = status == STATUSES.index("tracking"), status == STATUSES.index("out_of_range")
+    tracked_share = float(frames.weights[tracked].sum()) / total if total else 0.0
+    beyond_share = float(frames.weights[beyond].sum()) / total if total else 0.0
     if tracked_share + beyond_share < LEAST_HEAD_SHARE:
         return None
     if beyond_share > tracked_share:
-        side = majority([(pose.side, weight) for pose, weight in beyond if pose.side is not None])
-        told = [(pose.beyond_deg, weight) for pose, weight in beyond if pose.beyond_deg is not None]
-        return HeadObservation(None, None, side, beyond_share, median(told) if told else None)
-    yaw, spread = median_angle([((s.pose.yaw_deg or 0.0) + s.turn_to(axis_deg), w) for s, w in tracked if s.pose])
-    stated = median([(s.pose.yaw_sigma_deg or 0.0, w) for s, w in tracked if s.pose])
+        return _out_of_range(frames, beyond, beyond_share)
+    weights = frames.weights[tracked]
+    yaw, spread = median_angle((frames.column("yaw_deg") + frames.turns_to(axis_deg))[tracked], weights)
+    stated = median(frames.column("yaw_sigma_deg")[tracked], weights)
     return HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+
+
+def _out_of_range(frames: Frames, beyond: Flags, share: float) -> HeadObservation:
+    side = majority(frames.column("side")[beyond], frames.weights[beyond])
+    limits = frames.column("beyond_deg")
+    told = beyond & ~np.isnan(limits)
+    limit = median(limits[told], frames.weights[told]) if told.any() else None
+    return HeadObservation(None, None, None if side is None else SIDES[side], share, limit)

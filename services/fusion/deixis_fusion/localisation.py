@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from deixis_runtime.lens import Lens
 from deixis_runtime.mount import Vector, to_base
@@ -59,7 +60,7 @@ class PersonPlace:
     distance_m: float
     sigma_m: float
 
-    @property
+    @cached_property
     def axis_deg(self) -> float:
         """Direction from the person to the camera, where bearings are 0: degrees counter-clockwise from the map's x axis."""
         ahead, left = self.camera_m[0] - self.position_m[0], self.camera_m[1] - self.position_m[1]

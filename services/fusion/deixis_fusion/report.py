@@ -19,6 +19,7 @@ from .decision import Judgement
 from .evidence import Witness
 from .mass_vector import MassVector
 from .reasons import cut, explain
+from .sight import poi_at
 from .visibility import Candidate
 
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
@@ -107,7 +108,7 @@ def _rows(judgement: Judgement, rows: Rows) -> list[PoiBelief]:
     seen, chances = judgement.seen, judgement.chances
     chosen = (int(i) for i in np.argsort(-chances, kind="stable"))
     if rows.poi_id is not None:
-        chosen = (i for i in chosen if seen[i].poi.poi_id == rows.poi_id)
+        chosen = (i for i in chosen if poi_at(seen, i).poi_id == rows.poi_id)
     return [_row(judgement, i, seen[i]) for i in islice(chosen, rows.top)]
 
 
@@ -135,7 +136,7 @@ def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[PoiBelief]:
 
 def _credible(judgement: Judgement | None) -> list[str]:
     """The first of the credible set."""
-    return [judgement.seen[i].poi.poi_id for i in judgement.credible[:MAX_LISTED]] if judgement else []
+    return [poi_at(judgement.seen, i).poi_id for i in judgement.credible[:MAX_LISTED]] if judgement else []
 
 
 # --- evidence ---------------------------------------------------------------------------------------------------------
@@ -174,7 +175,7 @@ def _focal_sets(assignment: MassVector, seen: Sequence[Candidate]) -> list[messa
     """The sets of largest mass, each with its first members."""
     sets, left = [], MAX_MEMBERS
     for focal in assignment.largest(MAX_LISTED):
-        named = [seen[int(i)].poi.poi_id for i in focal.members[: min(left, MAX_LISTED)]]
+        named = [poi_at(seen, i).poi_id for i in focal.members[: min(left, MAX_LISTED)].tolist()]
         left -= len(named)
         sets.append(messages.FocalSet(poi_ids=named, size=len(focal.members), mass=focal.mass))
     return sets

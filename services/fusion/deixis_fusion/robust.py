@@ -6,56 +6,53 @@ vote and angles to the median, with a sigma that does not shrink with the number
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import TypeVar
 
-from .evidence import Sample, Weighed
+import numpy as np
+
+from .evidence import Sample
+from .frames import Frames, Values, wrapped
 from .localisation import wrapped_deg
-
-T = TypeVar("T")
 
 UNSETTLED_WEIGHT = 0.2
 # Median absolute deviation to standard deviation of a normal distribution.
 MAD_TO_SIGMA = 1.4826
+# Of sums of weights: of as many on either side the lower one is the median, whatever rounding does.
+ROUNDING = 1e-9
 
 
-def weigh(samples: Sequence[Sample], settle_s: float) -> Weighed:
-    """The samples of a stroke with their weights: at the start of a stroke the head may still be on its way."""
-    if not samples:
-        return []
-    settled_ns = samples[0].at_ns + int(settle_s * 1e9)
-    return [(sample, 1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT) for sample in samples]
+def weigh(samples: Sequence[Sample], settle_s: float) -> Frames:
+    """The frames of a stroke with their weights: at the start of a stroke the head may still be on its way."""
+    settled_ns = samples[0].at_ns + int(settle_s * 1e9) if samples else 0
+    return Frames.of(samples, [1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT for sample in samples])
 
 
-def median_angle(weighted: Sequence[tuple[float, float]]) -> tuple[float, float]:
+def median_angle(angles_deg: Values, weights: Values) -> tuple[float, float]:
     """Weighted median of angles, degrees within -180 and 180, and their spread from it as a standard deviation.
 
     Angles are ordered around their mean direction, so that it does not matter where the circle is cut.
     """
-    sine = math.fsum(weight * math.sin(math.radians(angle)) for angle, weight in weighted)
-    cosine = math.fsum(weight * math.cos(math.radians(angle)) for angle, weight in weighted)
-    mean = math.degrees(math.atan2(sine, cosine))
-    centre = median([(wrapped_deg(angle - mean), weight) for angle, weight in weighted])
-    spread = median([(abs(wrapped_deg(angle - mean) - centre), weight) for angle, weight in weighted])
+    radians = np.radians(angles_deg)
+    mean = float(np.degrees(np.arctan2(weights @ np.sin(radians), weights @ np.cos(radians))))
+    off = wrapped(angles_deg - mean)
+    centre = median(off, weights)
+    spread = median(np.abs(wrapped(off - centre)), weights)
     return wrapped_deg(mean + centre), MAD_TO_SIGMA * spread
 
 
-def median(weighted: Sequence[tuple[float, float]]) -> float:
-    """Weighted median."""
-    ordered = sorted(weighted)
-    half = math.fsum(weight for _, weight in ordered) / 2
-    reached = 0.0
-    for value, weight in ordered:
-        reached += weight
-        if reached >= half:
-            return value
-    return ordered[-1][0]
+def median(values: Values, weights: Values) -> float:
+    """Weighted median of these values, one at least."""
+    order = np.argsort(values, kind="stable")
+    reached = np.cumsum(weights[order])
+    middle = int(np.searchsorted(reached, reached[-1] * (0.5 - ROUNDING)))
+    return float(values[order[middle]])
 
 
-def majority(weighted: Sequence[tuple[T, float]]) -> T | None:
-    """The value of the largest total weight; the earlier one of equals."""
-    totals: dict[T, float] = {}
-    for value, weight in weighted:
-        totals[value] = totals.get(value, 0.0) + weight
-    return max(totals, key=lambda value: totals[value]) if totals else None
+def majority(choices: Values, weights: Values) -> int | None:
+    """The choice (0, 1 ...) of the largest total weight, the earlier one of equals; those that are no number do not count."""
+    known = ~np.isnan(choices)
+    if not known.any():
+        return None
+    chosen = choices[known].astype(np.intp)
+    totals = np.bincount(chosen, weights[known])
+    return int(chosen[np.argmax(totals[chosen])])

@@ -20,6 +20,7 @@ from .localisation import PersonPlace
 from .visibility import Candidate, Walls
 
 Values = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
 Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
@@ -31,7 +32,7 @@ _QUANTILES = np.array([NormalDist().inv_cdf(share) for share in _SHARES])
 # Their middles have less variance than the distribution that they stand for.
 DISTANCE_ERRORS: Values = _QUANTILES / _QUANTILES.std()
 # Across a POI, spread so that no part of it goes with one distance (multiples of the golden ratio).
-ACROSS: Values = (np.arange(CASES) * (math.sqrt(5) - 1) / 2) % 1 - 0.5
+ACROSS: Singles = ((np.arange(CASES) * (math.sqrt(5) - 1) / 2) % 1 - 0.5).astype(np.float32)
 LEAST_AWAY_M = 0.05
 WIDEST_SIGMA_DEG = 60.0
 # Sight lines are looked along anew where the person has moved by more: less than what hangs on a wall stands off it.
@@ -57,7 +58,7 @@ class Bearings(NamedTuple):
 
     likeliest: Values
     sigma: Values
-    cases: Values
+    cases: Singles
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +76,16 @@ class Sight(Sequence[Candidate]):
             return candidates
         likeliest = np.array([candidate.bearing_deg for candidate in candidates], dtype=np.float64)
         sigma = np.array([candidate.bearing_sigma_deg for candidate in candidates], dtype=np.float64)
-        bearings = Bearings(likeliest, sigma, likeliest + DISTANCE_ERRORS[:, None] * sigma)
+        cases = likeliest + DISTANCE_ERRORS[:, None] * sigma
+        bearings = Bearings(likeliest, sigma, cases.astype(np.float32))
         points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 2)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
-    def seen_from(self, place: PersonPlace) -> Bearings:
-        """The bearings of the same POIs from another place."""
-        return bearings_from(place, self.points, self.chosen)
+    def cases_from(self, places: Sequence[PersonPlace], part: slice) -> Singles:
+        """Bearings of a part of these POIs in all cases (v, CASES, n): from these v places, or from where they are seen now."""
+        if not places:
+            return self.bearings.cases[None, :, part]
+        return _cases(places, _Turned.of(places, self.points, self.chosen[part]))
 
     def poi(self, i: int) -> Poi:
         """The i-th POI in sight."""
@@ -101,6 +105,11 @@ class Sight(Sequence[Candidate]):
 
     def __iter__(self) -> Iterator[Candidate]:
         return (self[i] for i in range(len(self)))
+
+
+def poi_at(seen: Sequence[Candidate], i: int) -> Poi:
+    """The i-th POI of those that are seen; of a sight without a candidate made for it."""
+    return seen.poi(i) if isinstance(seen, Sight) else seen[i].poi
 
 
 class Lookout:
@@ -130,27 +139,58 @@ class Lookout:
         return Sight(bearings_from(place, points, self._index), points, self._index)
 
 
+class _Turned(NamedTuple):
+    """POIs as seen from v places, turned so that each person sees the camera at 0: metres ahead and to the left of the camera,
+    how far they are from the person (v, n) and across (n); the person's distance from the camera (v, 1).
+    """
+
+    ahead: Values
+    left: Values
+    away: Values
+    extent: Values
+    distance: Values
+
+    @staticmethod
+    def of(places: Sequence[PersonPlace], points: Points, index: Indices) -> _Turned:
+        """These POIs for persons there."""
+        camera = np.array([place.camera_m[:2] for place in places])
+        back = np.array([place.position_m[:2] for place in places]) - camera
+        distance = np.hypot(back[:, 0], back[:, 1])[:, None]
+        ways = np.divide(-back, distance, out=np.tile((1.0, 0.0), (len(places), 1)), where=distance > 0)
+        cos, sin = ways[:, :1], ways[:, 1:]
+        xy = points.xy[index]
+        x, y = xy[:, 0] - camera[:, :1], xy[:, 1] - camera[:, 1:]
+        ahead, left = cos * x + sin * y, cos * y - sin * x
+        away = np.maximum(np.hypot(ahead + distance, left), LEAST_AWAY_M)
+        return _Turned(ahead, left, away, points.extent[index], distance)
+
+
 def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearings:
     """Bearings of these POIs at the person, of the likeliest case and of all.
 
-    From the direction person -> camera, counter-clockwise from above (REP-103). In all cases the person stands on the line
-    through camera and head, which the picture tells well; how far along it, is known to `place.sigma_m`.
+    From the direction person -> camera, counter-clockwise from above (REP-103).
     """
-    camera = complex(*place.camera_m[:2])
-    ray = complex(*place.position_m[:2]) - camera
-    targets = points.xy[index] @ np.array([1, 1j]) - camera
-    # All turned so that the person sees the camera at 0.
-    turn = -abs(ray) / ray if ray else 1.0
-    targets, distance = targets * turn, abs(ray)
-    relative = place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0
-    extent = points.extent[index]
-    from_likeliest = targets + distance
-    likeliest = np.degrees(np.angle(from_likeliest))
-    away = np.maximum(np.abs(from_likeliest), LEAST_AWAY_M)
-    across = np.hypot(place.sigma_m * from_likeliest.imag / away, extent / math.sqrt(12))
+    turned = _Turned.of([place], points, index)
+    left, away = turned.left[0], turned.away[0]
+    likeliest = np.degrees(np.arctan2(left, turned.ahead[0] + turned.distance[0]))
+    across = np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12))
     sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, away)))
-    steps = distance * np.exp(relative * DISTANCE_ERRORS)
-    of_cases = targets + steps[:, None]
+    return Bearings(likeliest, sigma, _cases([place], turned)[0])
+
+
+def _cases(places: Sequence[PersonPlace], turned: _Turned) -> Singles:
+    """Bearings from v places in all cases (v, CASES, n).
+
+    In each the person stands on the line through camera and head, which the picture tells well; how far along it, is known to
+    `place.sigma_m`.
+    In single precision, a hundred thousandth of a degree: half as many bytes, of the most there is to reckon.
+    """
+    relative = np.array([place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0 for place in places])
+    steps = (turned.distance * np.exp(relative[:, None] * DISTANCE_ERRORS)).astype(np.float32)
     # The angle of a part of the POI, for small angles; a POI that one stands in lies anywhere.
-    aside = np.degrees(ACROSS[:, None] * np.minimum(extent / away, math.pi / 2))
-    return Bearings(likeliest, sigma, np.degrees(np.angle(of_cases)) + aside)
+    wide = np.degrees(np.minimum(turned.extent / turned.away, math.pi / 2)).astype(np.float32)
+    bearings = turned.ahead.astype(np.float32)[:, None, :] + steps[:, :, None]
+    np.arctan2(turned.left.astype(np.float32)[:, None, :], bearings, out=bearings)
+    bearings *= np.float32(math.degrees(1))
+    bearings += ACROSS[:, None] * wide[:, None, :]
+    return bearings

@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
 
-from .evidence import HandObservation, HeadObservation, Sample, View, Weighed
+from .evidence import HandObservation, HeadObservation, Sample, View
+from .frames import Frames
 from .hand_evidence import hand_over
 from .head_evidence import head_over
 from .localisation import PersonPlace
@@ -25,53 +28,59 @@ def last_place(samples: Sequence[Sample]) -> PersonPlace | None:
     return next((sample.place for sample in reversed(samples) if sample.place is not None), None)
 
 
-def views_of(weighed: Weighed, hand: HandObservation | None, head: HeadObservation | None) -> tuple[View, ...]:
+def views_of(frames: Frames, hand: HandObservation | None, head: HeadObservation | None) -> tuple[View, ...]:
     """The parts of a stroke of which hand and head are known as a whole; none where it was seen from one place."""
-    apart_m, parts = APART_M, _parts(weighed, APART_M)
-    while len(parts) > MOST_VIEWS:
+    placed, apart_m = frames.placed(), APART_M
+    spots = list(zip(placed.column("x_m").tolist(), placed.column("y_m").tolist(), strict=True))
+    while len(starts := _starts(spots, apart_m)) > MOST_VIEWS:
         apart_m *= 1.5
-        parts = _parts(weighed, apart_m)
-    if len(parts) < 2:
+    if len(starts) < 2:
         return ()
+    parts = [placed[start:stop] for start, stop in pairwise([*starts, len(placed)])]
     return tuple(_shared([_view(part, hand, head) for part in parts], parts))
 
 
-def _parts(weighed: Weighed, apart_m: float) -> list[Weighed]:
-    """Consecutive frames while the person is within `apart_m` of where the first of them was."""
-    parts: list[list[tuple[Sample, float]]] = []
-    began: PersonPlace | None = None
-    for sample, weight in weighed:
-        if sample.place is None:
+def _starts(spots: Sequence[tuple[float, float]], apart_m: float) -> list[int]:
+    """Where parts of consecutive frames begin, in each of which the person is within `apart_m` of where its first was.
+
+    No more than there may be views, and one.
+    """
+    starts: list[int] = []
+    began_x, began_y = 0.0, 0.0
+    for i, (x, y) in enumerate(spots):
+        if starts and math.hypot(x - began_x, y - began_y) <= apart_m:
             continue
-        if began is None or math.dist(began.position_m[:2], sample.place.position_m[:2]) > apart_m:
-            began = sample.place
-            parts.append([])
-        parts[-1].append((sample, weight))
-    return list(parts)
+        starts.append(i)
+        began_x, began_y = x, y
+        if len(starts) > MOST_VIEWS:
+            break
+    return starts
 
 
-def _view(part: Weighed, hand: HandObservation | None, head: HeadObservation | None) -> View:
+def _view(part: Frames, hand: HandObservation | None, head: HeadObservation | None) -> View:
     """What a part shows; the gesture, and how far all agree, is that of the whole stroke."""
-    place = last_place([sample for sample, _ in part])
-    axis_deg = place.axis_deg if place is not None else None
-    of_hand = hand_over(part, axis_deg) if hand is not None else None
-    of_head = head_over(part, axis_deg) if head is not None else None
+    of_hand, of_head = _shown(tuple(part.samples), tuple(part.weights.tolist()))
     if hand is not None and of_hand is not None:
         of_hand = replace(of_hand, gesture=hand.gesture, agreement=hand.agreement)
     if head is not None and of_head is not None:
         of_head = replace(of_head, agreement=head.agreement)
-    return View(of_hand, of_head, place)
+    return View(of_hand if hand else None, of_head if head else None, last_place(part.samples))
 
 
-def _shared(views: Sequence[View], parts: Sequence[Weighed]) -> list[View]:
+# Of a walk only the last part changes from frame to frame.
+@lru_cache(maxsize=8 * MOST_VIEWS)
+def _shown(samples: tuple[Sample, ...], weights: tuple[float, ...]) -> tuple[HandObservation | None, HeadObservation | None]:
+    frames, place = Frames.of(samples, weights), last_place(samples)
+    axis_deg = place.axis_deg if place is not None else None
+    return hand_over(frames, axis_deg), head_over(frames, axis_deg)
+
+
+def _shared(views: Sequence[View], parts: Sequence[Frames]) -> list[View]:
     """The views with their shares: by the frames of each part that shows the hand, or the head."""
-    hands = [_total(part) if view.hand is not None else 0.0 for view, part in zip(views, parts, strict=True)]
-    heads = [_total(part) if view.head is not None else 0.0 for view, part in zip(views, parts, strict=True)]
+    totals = [float(part.weights.sum()) for part in parts]
+    hands = [total if view.hand is not None else 0.0 for view, total in zip(views, totals, strict=True)]
+    heads = [total if view.head is not None else 0.0 for view, total in zip(views, totals, strict=True)]
     return [
         view._replace(hand_share=of_hand / max(sum(hands), 1e-9), head_share=of_head / max(sum(heads), 1e-9))
         for view, of_hand, of_head in zip(views, hands, heads, strict=True)
     ]
-
-
-def _total(part: Weighed) -> float:
-    return math.fsum(weight for _, weight in part)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +13,15 @@ import numpy.typing as npt
 
 from .config import HandConfig, HeadConfig
 from .confusion import HandConfusion
-from .curves import BEARINGS, at, hand_curve, head_curve
+from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
 from .sight import Sight
 
 Values = npt.NDArray[np.float64]
+
+NOTHING: Curve = np.zeros_like(BEARINGS)
+# POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
+AT_A_TIME = 4096
 
 
 class Weighing(NamedTuple):
@@ -59,34 +66,56 @@ def weigh(
     The frames of a stroke err alike: what was seen from several places is one observation, and each counts by its share of it
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
-    told, best, floor = np.ones((2, *seen.bearings.cases.shape)), 1.0, 1.0
-    for view in evidence.views or (View(evidence.hand, evidence.head),):
-        of_hand = _hand(view.hand, view.hand_share, hand_config, confusion)
-        curves = np.stack([of_hand, _head(view.head, view.head_share, head_config)])
-        bearings = seen.bearings if view.place is None else seen.seen_from(view.place)
-        told *= at(curves, bearings.cases)
-        best *= float(curves.max(axis=1).prod())
-        floor *= float(curves[1].min())
-    joint = told[0] * told[1]
-    return Weighing(told[0].mean(axis=0), told[1].mean(axis=0), joint.mean(axis=0), joint.max(axis=0) / best, floor)
+    views = evidence.views or (View(evidence.hand, evidence.head),)
+    curves = {"hand": _hands(views, hand_config, confusion), "head": _heads(views, head_config)}
+    told = {name: of_views for name, of_views in curves.items() if of_views is not None}
+    if not told:
+        even = np.ones(len(seen))
+        return Weighing(even, even, even, even)
+    places = [view.place for view in views if view.place is not None]
+    at_a_time = max(1, AT_A_TIME // len(views))
+    parts = [_part(told, seen.cases_from(places, slice(start, start + at_a_time))) for start in range(0, len(seen), at_a_time)]
+    hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
+    best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
+    floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
+    return Weighing(hand, head, joint, most / best, floor)
 
 
-def shares(weights: Sequence[float]) -> list[float]:
-    """The weights, summing to 1; of none, none."""
-    total = sum(weights)
-    return [weight / total for weight in weights] if total > 0 else list(weights)
+def _part(told: Mapping[str, Values], cases: Singles) -> Values:
+    """Of a part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
+    likelihoods = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
+    joint = np.asarray(math.prod(likelihoods.values()))
+    means = [likelihoods[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
+    return np.array([*means, joint.mean(axis=0), joint.max(axis=0)], dtype=np.float64)
 
 
-def _hand(hand: HandObservation | None, share: float, config: HandConfig, confusion: HandConfusion | None) -> Values:
-    if hand is None or share <= 0:
-        return np.ones_like(BEARINGS)
-    return np.asarray(hand_curve(hand, config, confusion) ** (share * _trust(hand.agreement)))
+def _hands(views: Sequence[View], config: HandConfig, confusion: HandConfusion | None) -> Values | None:
+    """What the hand tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
+    shares = [view.hand_share * _trust(view.hand.agreement) if view.hand else 0.0 for view in views]
+    if not any(shares):
+        return None
+    logs = [_log_of_hand(replace(view.hand, agreement=1.0), config, confusion) if view.hand else NOTHING for view in views]
+    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
 
 
-def _head(head: HeadObservation | None, share: float, config: HeadConfig) -> Values:
-    if head is None or share <= 0:
-        return np.ones_like(BEARINGS)
-    return np.asarray(head_curve(head, config) ** (share * _trust(head.agreement)))
+def _heads(views: Sequence[View], config: HeadConfig) -> Values | None:
+    """What the head tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
+    shares = [view.head_share * _trust(view.head.agreement) if view.head else 0.0 for view in views]
+    if not any(shares):
+        return None
+    logs = [_log_of_head(replace(view.head, agreement=1.0), config) if view.head else NOTHING for view in views]
+    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
+
+
+# Of a walk only the last view changes from frame to frame.
+@lru_cache(maxsize=256)
+def _log_of_hand(hand: HandObservation, config: HandConfig, confusion: HandConfusion | None) -> Curve:
+    return np.log(hand_curve(hand, config, confusion))
+
+
+@lru_cache(maxsize=256)
+def _log_of_head(head: HeadObservation, config: HeadConfig) -> Curve:
+    return np.log(head_curve(head, config))
 
 
 def _trust(agreement: float) -> float:
