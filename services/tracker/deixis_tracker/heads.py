@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deixis_tracker.frame import Image, around
-from deixis_tracker.skin import colour_table, look_up
+from deixis_tracker.skin import colour_table, look_up, smoothed
 
 Map = NDArray[np.float32]
 
@@ -86,11 +86,7 @@ def _share_table(of_255: Image) -> Map:
 
 def _histogram(part: Image, mask: Image) -> Map:
     """Share of each colour, smoothed over neighbouring bins."""
-    counts: NDArray[np.float64] = np.asarray(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3), np.float64)
-    for axis in range(3):
-        moved = np.moveaxis(counts, axis, 0)
-        padded = np.concatenate([moved[:1], moved, moved[-1:]])
-        counts = np.moveaxis(0.2 * padded[:-2] + 0.6 * padded[1:-1] + 0.2 * padded[2:], 0, axis)
+    counts = smoothed(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3).astype(np.float64), 0.2)
     return np.asarray((counts + 1e-3) / (counts.sum() + 1e-3 * BINS**3), np.float32)
 
 

@@ -124,8 +124,7 @@ class Tracker:
             self._people = people_mask(self._heads.persons, (coarse.shape[0], coarse.shape[1]))
 
     def _view(self, image: Image, work: Image, coarse: Image, scale: float) -> Views:
-        grey = np.asarray(cv2.cvtColor(work, cv2.COLOR_BGR2GRAY), np.uint8)
         changed = self._room.changed(coarse, self._people)
         # A face of no colour would teach that all that is as bright is skin.
         skin = np.zeros(coarse.shape[:2], np.uint8) if self.is_grey else self._skin.probability(coarse)
-        return Views(image, scale, work, grey, coarse, skin, changed)
+        return Views(image, scale, work, coarse, skin, changed)
