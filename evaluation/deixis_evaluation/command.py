@@ -69,7 +69,10 @@ def register(subparsers: Any) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="write NAME.jsonl there, one line per message published; with --stage NAME.png, the stage's answers over time",
+        help="write NAME.jsonl there, one line per message published; with --stage headpose NAME.png, its answers over time",
+    )
+    parser.add_argument(
+        "--video", type=Path, metavar="DIR", help="with --stage tracker: write NAME.mp4 there, the tracks drawn over the frames"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all scores to this file")
     parser.add_argument(
@@ -89,6 +92,8 @@ def run(given: argparse.Namespace) -> int:
     """Score the clips. 0 when all were played, 1 when one was not. Raises CommandError or HostFailed."""
     if given.confusion is not None and given.stage != "gesture":
         raise CommandError("--confusion: goes with --stage gesture")
+    if given.video is not None and given.stage != "tracker":
+        raise CommandError("--video: draws tracks, and goes with --stage tracker")
     if given.stage is None:
         return _run_system(given)
     return RUNS_ALONE[given.stage](given)
@@ -124,12 +129,12 @@ def _run_headpose(given: argparse.Namespace) -> int:
 
 def _run_tracker(given: argparse.Namespace) -> int:
     if given.out is not None:
-        raise CommandError("--out: with --stage tracker nothing is drawn; --json keeps its figures")
+        raise CommandError("--out: --stage tracker keeps its figures in --json FILE, and draws with --video DIR")
     sets = stage_settings(given.sets)
     config = check_tracker(given.truth, sets)
     chosen = _choose(given)
     check_writable(given.json)
-    return run_tracker(chosen, config, sets, given.json, _console())
+    return run_tracker(chosen, config, sets, given.video, given.json, _console())
 
 
 def _run_gesture(given: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 
 import cv2
 from deixis_cli.options import CommandError
+from deixis_schemas.messages import Track
 from deixis_tracker.config import TrackerConfig
 from rich import box
 from rich.console import Console
@@ -17,14 +18,17 @@ from rich.table import Table
 
 from .blob_scores import BlobScores, Recall
 from .chosen_clips import Chosen
-from .clip_progress import played
+from .clip_progress import OnFrame, played
+from .clips import Clip, TrueFrame
 from .core_config import core_config
 from .json_file import write_json
 from .machine import describe_machine, say_machine
 from .matching import DEFINITION
 from .proportion import Proportion
+from .replay import Picture
 from .table import number, percent
 from .tracker_play import FAR_FACE_WIDTHS, TrackerScore, evaluate_tracker
+from .tracker_video import VideoError, check_video, drawn_into
 
 DEFINITIONS = (
     DEFINITION,
@@ -45,13 +49,19 @@ def check_tracker(truth: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Tr
 
 
 def run_tracker(
-    chosen: Chosen, config: TrackerConfig, sets: Mapping[str, Sequence[str]], json_file: Path | None, console: Console
+    chosen: Chosen,
+    config: TrackerConfig,
+    sets: Mapping[str, Sequence[str]],
+    video: Path | None,
+    json_file: Path | None,
+    console: Console,
 ) -> int:
-    """Play and tell. 0 when all clips were played, 1 when one was not."""
+    """Play, draw into `video`, and tell. 0 when all clips were played, 1 when one was not. Raises CommandError."""
+    check_video(video, chosen.clips)
     cv2.setNumThreads(1)  # as the stage does
     scores = []
     for clip, on_frame, complain in played(chosen.clips):
-        score = evaluate_tracker(clip, config, on_frame)
+        score = _play(clip, config, video, on_frame)
         if score.failure is not None:
             complain(f"{clip.name}: {score.failure}")
         scores.append(score)
@@ -69,6 +79,19 @@ def run_tracker(
     if failed:
         print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
     return 1 if failed else 0
+
+
+def _play(clip: Clip, config: TrackerConfig, video: Path | None, on_frame: OnFrame) -> TrackerScore:
+    try:
+        with drawn_into(video, clip) as draw:
+
+            def on_tracks(picture: Picture, truth: TrueFrame, tracks: Sequence[Track]) -> None:
+                draw(picture, truth, tracks)
+                on_frame()
+
+            return evaluate_tracker(clip, config, on_tracks)
+    except VideoError as error:
+        return TrackerScore(clip.name, clip.truth.meta.kind, len(clip.truth.frames), failure=str(error))
 
 
 def total_of(scores: Sequence[TrackerScore]) -> TrackerScore:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from deixis_schemas.messages import Producer, Track, Tracks
@@ -16,9 +16,11 @@ from .clips import Clip, ClipError, TrueFrame, TruePerson, Truth
 from .matching import finds_face, finds_hand
 from .proportion import Proportion
 from .recording import Recording
-from .replay import INSTANCE, Given, ReplayError
+from .replay import INSTANCE, Given, Picture, ReplayError
 
 FAR_FACE_WIDTHS = 1.0
+OnTracks = Callable[[Picture, TrueFrame, Sequence[Track]], None]
+"""Is told of each frame when it is played: the picture, the truth of it, and what the tracker says."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,11 @@ class TrackerScore:
     failure: str | None = None
 
 
-def evaluate_tracker(clip: Clip, config: TrackerConfig, on_frame: Callable[[], None] = lambda: None) -> TrackerScore:
+def evaluate_tracker(clip: Clip, config: TrackerConfig, on_tracks: OnTracks) -> TrackerScore:
     """Play one clip; what goes wrong with it stands in the score's `failure`."""
     truth = clip.truth
     try:
-        recording, cpu_ms = play_tracker(clip, config, on_frame)
+        recording, cpu_ms = play_tracker(clip, config, on_tracks)
     except (ClipError, ReplayError) as error:
         return TrackerScore(clip.name, truth.meta.kind, len(truth.frames), failure=str(error))
     return TrackerScore(
@@ -57,7 +59,7 @@ def evaluate_tracker(clip: Clip, config: TrackerConfig, on_frame: Callable[[], N
     )
 
 
-def play_tracker(clip: Clip, config: TrackerConfig, on_frame: Callable[[], None]) -> tuple[Recording, float]:
+def play_tracker(clip: Clip, config: TrackerConfig, on_tracks: OnTracks) -> tuple[Recording, float]:
     """Its tracks of each frame, and the processor's time a frame, ms. Raises ClipError or ReplayError."""
     given, recording, tracker = Given(clip), Recording(), Tracker(config)
     spent_s = 0.0
@@ -71,7 +73,7 @@ def play_tracker(clip: Clip, config: TrackerConfig, on_frame: Callable[[], None]
         height, width = picture.shape[:2]
         said = Tracks.derive(frame, Producer("tracker", INSTANCE), width=width, height=height, tracks=tracks)
         recording.add(said, frame.stamp_ns)
-        on_frame()
+        on_tracks(picture, clip.truth.frames[frame.seq], tracks)
     return recording, 1e3 * spent_s / max(1, len(clip.truth.frames))
 
 

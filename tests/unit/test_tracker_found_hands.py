@@ -17,7 +17,7 @@ HAND = 300, 200
 def seen(image):
     coarse = coarsened(image)
     nothing = np.zeros(coarse.shape[:2], np.uint8)
-    return Views(image, 1.0, image, np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8), coarse, nothing, nothing)
+    return Views(image, 1.0, image, coarse, nothing, nothing)
 
 
 @pytest.fixture

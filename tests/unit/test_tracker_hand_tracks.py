@@ -62,7 +62,7 @@ def test_a_region_that_is_gone_at_full_resolution_is_no_blob(person):
     seen[150:180, 160:162] = SKIN
     model = SkinModel(0.2)
     changed = np.asarray(255 * np.any(seen != room, axis=2), np.uint8)
-    views = Views(full, 1.0, full, full[..., 0], seen, np.asarray(changed * (model.probability(seen) > 150)), changed)
+    views = Views(full, 1.0, full, seen, np.asarray(changed * (model.probability(seen) > 150)), changed)
     background = Background(room, 20)
     background.changed(seen, np.zeros_like(changed))
     assert np.count_nonzero(views.skin) > 50

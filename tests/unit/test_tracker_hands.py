@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from deixis_tracker.hands import cut_hand, geodesic, outline
+from deixis_tracker.hands import cut_hand, outline
 
 WIDTH = 60.0
 
@@ -28,15 +28,6 @@ def test_a_tracked_hand_at_the_near_end_of_a_raised_forearm_stays_there():
 def test_an_upper_arm_is_no_hand_even_where_one_was_expected():
     hand = cut_hand(arm(), 100, 50, (95, 60), WIDTH, 1.0, (125, 61))
     assert hand.centroid[0] > 240
-
-
-def test_distance_goes_around_the_elbow():
-    bent = np.zeros((80, 80), np.uint8)
-    bent[70:80] = 1
-    bent[:, 70:80] = 1
-    distance = geodesic(bent, (0, 75))
-    assert distance[0, 75] > np.hypot(75, 75) * 1.15
-    assert distance[0, 0] == -1
 
 
 def test_the_outline_is_the_border_of_the_hand_pixel_by_pixel():

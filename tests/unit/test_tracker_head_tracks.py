@@ -31,7 +31,7 @@ def person_at(x, y, width=50.0):
 def views_of(image):
     coarse = coarsened(image)
     black = np.zeros(coarse.shape[:2], np.uint8)
-    return Views(image, 1.0, image, np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8), coarse, black, black)
+    return Views(image, 1.0, image, coarse, black, black)
 
 
 def test_a_head_that_leaves_the_picture_between_two_frames_is_let_go():

@@ -1,5 +1,5 @@
 import numpy as np
-from deixis_tracker.skin import SkinModel, hysteresis, look_up
+from deixis_tracker.skin import SkinModel, colour_table, hysteresis, look_up
 
 
 def patch(*bgr):
@@ -44,7 +44,7 @@ def test_a_table_is_read_at_blue_green_red():
     table = np.zeros((32, 32, 32), np.uint8)
     table[1, 2, 3] = 77
     image = np.array([[[8, 16, 24], [24, 16, 8]]], np.uint8)
-    assert look_up(table, image).tolist() == [[77, 0]]
+    assert look_up(colour_table(table), image).tolist() == [[77, 0]]
 
 
 def test_hysteresis_keeps_weak_pixels_only_with_a_strong_one():

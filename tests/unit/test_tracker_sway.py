@@ -8,12 +8,12 @@ LATER_NS = 400_000_000
 
 @pytest.fixture
 def scene():
-    """Grey picture with something of a head's size at (150, 120)."""
+    """Picture without colour, with something of a head's size at (150, 120)."""
     rng = np.random.default_rng(2)
     picture = cv2.resize(rng.integers(60, 200, (24, 32), np.uint8), (320, 240), interpolation=cv2.INTER_CUBIC)
     cv2.ellipse(picture, (150, 120), (14, 19), 0, 0, 360, 90, -1)
     cv2.circle(picture, (146, 116), 3, 30, -1)
-    return picture
+    return cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
 
 
 def moved(picture, dx, dy=0.0):
@@ -21,7 +21,7 @@ def moved(picture, dx, dy=0.0):
 
 
 def noisy(picture, seed, gain=1.0):
-    noise = np.random.default_rng(seed).normal(0, 4, picture.shape)
+    noise = np.random.default_rng(seed).normal(0, 4, (*picture.shape[:2], 1))
     return np.clip(picture * gain + noise, 0, 255).astype(np.uint8)
 
 
@@ -57,4 +57,4 @@ def test_a_place_that_is_not_whole_in_the_picture_tells_nothing(scene, x, y):
 
 
 def test_an_even_wall_tells_nothing():
-    assert Glimpse.of(np.full((240, 320), 90, np.uint8), 150, 120, 30, 0) is None
+    assert Glimpse.of(np.full((240, 320, 3), 90, np.uint8), 150, 120, 30, 0) is None

@@ -26,6 +26,7 @@ UPHEAVAL = 0.35  # share of changed room beyond which the light, not a person, c
 SAME_LIGHT = 0.01  # a gain so near 1 is not worth a pass over the picture
 SHADOW_CHROMA = 0.07
 SHADOW_DARKEST = 0.35
+LOG_LEVELS = np.log(np.arange(256, dtype=np.float32) + 6)
 MOVING_RATE = 0.1  # of learning, per frame, while the camera moves: a room that is moved again and again becomes blurred
 EDGES = np.ones((3, 3), np.uint8)  # of the room, which lie a little aside while the camera moves
 DOUBT_FADES = 13  # of 255, per update: what the camera's motion laid bare, or a person left, is known after two seconds
@@ -84,17 +85,16 @@ class Background:
 
     def remove_shadow(self, image: Image, mask: Mask) -> Mask:
         """`mask` without pixels that are the room, darker and of the same colour: the shadow of a person."""
-        rows, columns = np.nonzero(mask)
-        if not len(rows):
+        places = np.flatnonzero(mask != 0)
+        if not len(places):
             return mask
-        seen = np.log(image[rows, columns].astype(np.float32) + 6)
-        room = np.log(self._expected[rows, columns].astype(np.float32) + 6)
+        seen, room = (LOG_LEVELS[picture.reshape(-1, 3)[places]] for picture in (image, self._expected))
         ratio = seen - room
         darker = ratio.mean(axis=1)
         same_colour = (np.abs(ratio[:, 2] - ratio[:, 1]) < SHADOW_CHROMA) & (np.abs(ratio[:, 1] - ratio[:, 0]) < SHADOW_CHROMA)
         shadow = same_colour & (darker < 0.05) & (darker > np.log(SHADOW_DARKEST))
         result = mask.copy()
-        result[rows[shadow], columns[shadow]] = 0
+        result.reshape(-1)[places[shadow]] = 0
         return result
 
     def update(self, image: Image, changed: Mask, frozen: Mask, step: Step) -> None:
@@ -130,12 +130,18 @@ class Background:
         gains = []
         for c in range(3):
             usable = (room[:, c] > 20) & (room[:, c] < 245) & (seen[:, c] < 245)
-            gains.append(float(np.median(seen[usable, c] / room[usable, c])) if usable.sum() >= 20 else 1.0)
+            gains.append(_median(seen[usable, c] / room[usable, c]) if usable.sum() >= 20 else 1.0)
         if max(abs(gain - 1) for gain in gains) < SAME_LIGHT:
             return self._shown
         levels = np.arange(256, dtype=np.float32)[:, None] * np.array(gains, np.float32)
         table = np.clip(levels, 0, 255).astype(np.uint8)[None]
         return np.asarray(cv2.LUT(self._shown, table), np.uint8)
+
+
+def _median(values: NDArray[np.float32]) -> float:
+    """That of numpy, in a third of its time."""
+    ordered = np.sort(values)
+    return float(ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1].mean())
 
 
 class MotionHistory:

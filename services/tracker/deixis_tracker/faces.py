@@ -41,14 +41,14 @@ def load_cascade() -> cv2.CascadeClassifier:
     return cascade
 
 
-def look(grey: Image, x: float, y: float, width: float) -> Box | None:
-    """The face near (x, y) that is about `width` wide, as a Haar box; None when none is seen there."""
+def look(picture: Image, x: float, y: float, width: float) -> Box | None:
+    """The face near (x, y) of (H, W, 3) that is about `width` wide, as a Haar box; None when none is seen there."""
     box = around(x, y, 1.15 * width, 1.15 * width, 1.15 * width, 1.15 * width)
-    rows, columns = box.window(*grey.shape)
-    part = grey[rows, columns]
+    rows, columns = box.window(*picture.shape[:2])
     scale = LOOKED_AT_PX / width
-    if min(part.shape) * scale < WINDOW_PX * 1.1:
+    if min(picture[rows, columns].shape[:2]) * scale < WINDOW_PX * 1.1:
         return None
+    part = cv2.cvtColor(picture[rows, columns], cv2.COLOR_BGR2GRAY)
     size = (round(part.shape[1] * scale), round(part.shape[0] * scale))
     small = cv2.resize(part, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     least, most = (round(LOOKED_AT_PX * f) for f in (0.74, 1.32))

@@ -31,6 +31,7 @@ KNOWN_PX = (6.5, 30.0)  # breadths of heads that it knows
 HEAD, RIGHT_HAND, LEFT_HAND, BREADTH = range(4)
 LEAST_SIDE_PX = 48  # a smaller picture shows no head with what is around it
 WIDE, ABOVE, BELOW = 5.3, 3.2, 6.2  # surroundings of a head that are looked at, head widths; an arm is about 4.5 long
+NEIGHBOURS = np.ones((3, 3), np.uint8)
 NEAREST = 0.6  # two heads of one picture are so many widths apart, at least
 
 
@@ -50,6 +51,8 @@ class Surroundings:
         """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
         self._maps = maps
         self._x0, self._y0, self._scale = x0, y0, scale
+        self._summits: dict[int, tuple[Maps, list[tuple[int, int]]]] = {}
+        self._seen: dict[tuple[int, int, int], Seen] = {}
 
     def moved(self, shift: Shift) -> Surroundings:
         """The same maps where the room has moved."""
@@ -59,11 +62,11 @@ class Surroundings:
 
     def heads(self, least: float) -> list[Seen]:
         """Heads of so high log odds, best first."""
-        return sorted(self._peaks(HEAD, least), key=lambda seen: -seen.odds)
+        return self._peaks(HEAD, least)
 
     def hands(self, kind: int, least: float) -> list[Seen]:
         """Right or left hands of so high log odds, best first."""
-        return sorted(self._peaks(kind, least), key=lambda seen: -seen.odds)
+        return self._peaks(kind, least)
 
     def odds_near(self, kind: int, x: float, y: float, reach: float) -> float:
         """The highest log odds within `reach` pixels of a place; -inf outside."""
@@ -79,11 +82,19 @@ class Surroundings:
         return tuple((((at - of + 0.5) / self._scale - 0.5) - middle) / STRIDE for at, of in ((x, self._x0), (y, self._y0)))  # type: ignore[return-value]
 
     def _peaks(self, kind: int, least: float) -> list[Seen]:
-        odds = self._maps[kind]
-        top = (odds >= cv2.dilate(odds, np.ones((3, 3), np.uint8))) & (odds >= least)
-        return [self._peak(kind, int(row), int(column)) for row, column in zip(*np.nonzero(top), strict=True)]
+        # Each is worked out once, for these are asked for again and again: for each blob, and until the next look.
+        if kind not in self._summits:
+            self._summits[kind] = _summits(self._maps[kind])
+        odds, cells = self._summits[kind]
+        return [self._peak(kind, *cell) for cell in cells[: int(np.count_nonzero(odds >= least))]]
 
     def _peak(self, kind: int, row: int, column: int) -> Seen:
+        at = kind, row, column
+        if at not in self._seen:
+            self._seen[at] = self._worked_out(kind, row, column)
+        return self._seen[at]
+
+    def _worked_out(self, kind: int, row: int, column: int) -> Seen:
         odds = self._maps[kind]
         dx, dy = _summit(odds[row], column), _summit(odds[:, column], row)
         middle = (STRIDE - 1) / 2
@@ -149,6 +160,14 @@ def apart(heads: list[Seen]) -> list[Seen]:
         if not any(near):
             kept.append(seen)
     return kept
+
+
+def _summits(odds: Maps) -> tuple[Maps, list[tuple[int, int]]]:
+    """Odds and cells (row, column) of a map's local maxima, the highest first."""
+    rows, columns = np.nonzero(odds >= cv2.dilate(odds, NEIGHBOURS))
+    order = np.argsort(-odds[rows, columns], kind="stable")
+    cells = list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
+    return odds[rows[order], columns[order]], cells
 
 
 def _summit(line: Maps, k: int) -> float:

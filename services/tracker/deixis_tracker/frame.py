@@ -56,14 +56,13 @@ def repeated(rate: float, times: int) -> float:
 
 
 class Views(NamedTuple):
-    """One frame: as given, and `scale` of its pixels to one of the working picture; `full` (H, W, 3) and grey at working
-    resolution; `coarse`, P(skin) and what changed at half of it.
+    """One frame: as given, and `scale` of its pixels to one of the working picture; `full` (H, W, 3) at working resolution;
+    `coarse`, P(skin) and what changed at half of it.
     """
 
     frame: Image
     scale: float
     full: Image
-    grey: Image
     coarse: Image
     skin: Image
     changed: Mask

@@ -73,7 +73,7 @@ class HandTracks:
         """Give each claiming track its pixels of the blob, by density of the hypotheses."""
         if len(claims) <= 1:
             return [(claim, blob) for claim in claims]
-        best = np.argmax([density[cells] for density in densities], axis=0)
+        best = np.argmax([density.at(cells) for density in densities], axis=0)
         rows, columns = np.nonzero(blob.mask)
         parts = []
         for k, claim in enumerate(claims):

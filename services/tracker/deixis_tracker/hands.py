@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deixis_tracker.frame import Mask
+from deixis_tracker.growth import farthest, within
 
-CELLS_PER_WIDTH = 12  # resolution of the geodesic distances
+CELLS_PER_WIDTH = 12  # resolution at which ways along an arm are measured
 NEAR_SHOULDER = 1.2  # head widths: a blob that starts so near the shoulder starts with the upper arm
-SQUARE, CROSS = np.ones((3, 3), np.uint8), np.asarray(cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)), np.uint8)
 
 
 class Hand(NamedTuple):
@@ -31,23 +31,6 @@ class Hand(NamedTuple):
     centroid: tuple[float, float]
     tip: tuple[float, float]
     arm_length_px: float
-
-
-def geodesic(mask: Mask, seed: tuple[int, int]) -> NDArray[np.float32]:
-    """Distance in pixels inside the mask from the `seed` (x, y) to each pixel of the mask; -1 where it does not lead."""
-    reached = np.zeros_like(mask)
-    reached[seed[1], seed[0]] = 1
-    since = np.zeros(mask.shape, np.float32)  # steps since a pixel was reached; counting is cheaper than marking
-    count = 1
-    for step in range(1, mask.size):
-        # Square and cross in turn reach an octagon, nearly a circle.
-        grown = cv2.bitwise_and(cv2.dilate(reached, SQUARE if step % 2 else CROSS), mask)
-        grown_count = cv2.countNonZero(grown)
-        if grown_count == count:
-            break
-        since += reached
-        reached, count = np.asarray(grown, np.uint8), grown_count
-    return np.where(reached > 0, since.max() - since, -1).astype(np.float32)
 
 
 def cut_hand(
@@ -71,9 +54,8 @@ def cut_hand(
     small = mask if factor == 1 else _shrink(mask, factor)
     offset = np.array([x0, y0], float)
     near = _closest(small, (np.array(shoulder) - offset) * factor)
-    from_shoulder = geodesic(small, near)
-    far = _farthest(from_shoulder)
-    tip, whole = far, float(from_shoulder.max())
+    far, whole = farthest(small, near)
+    tip = far
     if expected is not None and whole > 1.2 * length * head_width_px * factor:
         target = (np.array(expected) - offset) * factor
         half = 0.5 * length * head_width_px * factor
@@ -82,8 +64,7 @@ def cut_hand(
         from_body = float(np.hypot(*(np.array(near) / factor + offset - shoulder))) / head_width_px
         if from_body > NEAR_SHOULDER and away[1] < 0.5 * away[0] and away[1] < half:
             tip = near
-    distance = geodesic(small, tip)
-    keep = np.asarray((distance >= 0) & (distance <= length * head_width_px * factor), np.uint8)
+    keep = within(small, tip, int(length * head_width_px * factor))
     if factor != 1:
         keep = np.asarray(cv2.resize(keep, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_NEAREST), np.uint8)
     hand = mask & keep
@@ -120,7 +101,8 @@ def _measured(hand: Mask, x0: int, y0: int, tip: tuple[float, float], arm_length
 
 def thickness(mask: Mask) -> float:
     """Diameter in pixels of the largest circle inside a mask."""
-    distance = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 3)
+    padded = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
+    distance = cv2.distanceTransform(padded, cv2.DIST_L2, 3)
     return 2 * float(distance.max()) - 1
 
 
@@ -143,11 +125,6 @@ def _closest(mask: Mask, point: NDArray[np.float64]) -> tuple[int, int]:
     rows, columns = np.nonzero(mask)
     k = int(np.argmin((columns - point[0]) ** 2 + (rows - point[1]) ** 2))
     return int(columns[k]), int(rows[k])
-
-
-def _farthest(distance: NDArray[np.float32]) -> tuple[int, int]:
-    row, column = np.unravel_index(int(np.argmax(distance)), distance.shape)
-    return int(column), int(row)
 
 
 def _toward(start: NDArray[np.int64], end: NDArray[np.int64], length: float) -> NDArray[np.float64]:

@@ -139,7 +139,7 @@ class HeadSearch:
 
 
 def _is_face(candidate: Candidate, views: Views) -> bool:
-    return look(views.grey, candidate.x, candidate.y, candidate.width) is not None
+    return look(views.full, candidate.x, candidate.y, candidate.width) is not None
 
 
 def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
@@ -148,9 +148,9 @@ def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
         candidate.glimpse = None
         return False
     if candidate.glimpse is None:
-        candidate.glimpse = Glimpse.of(views.grey, candidate.x, candidate.y, candidate.width, step.now_ns)
+        candidate.glimpse = Glimpse.of(views.full, candidate.x, candidate.y, candidate.width, step.now_ns)
         return False
-    return candidate.glimpse.sways(views.grey, step.now_ns)
+    return candidate.glimpse.sways(views.full, step.now_ns)
 
 
 def worth(odds: float) -> float:

@@ -244,7 +244,7 @@ def _measuring_is_due(person: Person, step: Step) -> bool:
 
 def _look(person: Person, views: Views) -> Box | None:
     """The Haar box of a person's face, where it is seen from the front."""
-    return look(views.grey, person.x, person.y + BOX_BELOW_HEAD * person.width, person.width)
+    return look(views.full, person.x, person.y + BOX_BELOW_HEAD * person.width, person.width)
 
 
 def _skin_share(person: Person, skin: Image) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deixis_tracker.frame import Image, around
-from deixis_tracker.skin import look_up
+from deixis_tracker.skin import colour_table, look_up, smoothed
 
 Map = NDArray[np.float32]
 
@@ -57,7 +57,7 @@ class HeadColours:
     def __init__(self) -> None:
         self._inside: Map | None = None
         self._around: Map | None = None
-        self._table = np.full((BINS,) * 3, 127, np.uint8)
+        self._table = _share_table(np.full((BINS,) * 3, 127, np.uint8))
 
     def learn(self, image: Image, x: float, y: float, width: float, rate: float) -> None:
         """Move the model by `rate` toward the picture around a head at (x, y)."""
@@ -72,20 +72,21 @@ class HeadColours:
         ring = np.asarray((radius > 1.12) & (radius < 1.7) & (gy[:, None] < 0.3), np.uint8)
         self._inside = _blend(self._inside, _histogram(part, inside), rate)
         self._around = _blend(self._around, _histogram(part, ring), rate)
-        self._table = (255 * self._inside / np.maximum(self._inside + self._around, 1e-9)).astype(np.uint8)
+        share = 255 * self._inside / np.maximum(self._inside + self._around, 1e-9)
+        self._table = _share_table(share.astype(np.uint8))
 
     def map(self, part: Image) -> Map:
         """P(head) of each pixel, 0 to 1."""
-        return np.asarray(look_up(self._table, part) * np.float32(1 / 255), np.float32)
+        return look_up(self._table, part)
+
+
+def _share_table(of_255: Image) -> Map:
+    return colour_table(np.asarray(of_255 * np.float32(1 / 255), np.float32))
 
 
 def _histogram(part: Image, mask: Image) -> Map:
     """Share of each colour, smoothed over neighbouring bins."""
-    counts: NDArray[np.float64] = np.asarray(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3), np.float64)
-    for axis in range(3):
-        moved = np.moveaxis(counts, axis, 0)
-        padded = np.concatenate([moved[:1], moved, moved[-1:]])
-        counts = np.moveaxis(0.2 * padded[:-2] + 0.6 * padded[1:-1] + 0.2 * padded[2:], 0, axis)
+    counts = smoothed(cv2.calcHist([part], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3).astype(np.float64), 0.2)
     return np.asarray((counts + 1e-3) / (counts.sum() + 1e-3 * BINS**3), np.float32)
 
 
@@ -97,7 +98,8 @@ class HeadFinder:
     """Lays the ellipse over the map of P(head)."""
 
     def __init__(self) -> None:
-        self._inside, self._around = ellipse_kernels()
+        inside, around = ellipse_kernels()
+        self._kernel = inside - around
 
     def find(self, image: Image, colours: HeadColours, x: float, y: float, width: float, tightness: float) -> HeadFound:
         """The head near the prediction (x, y). `tightness`: penalty on leaving it by one head width, in units of support."""
@@ -115,9 +117,7 @@ class HeadFinder:
             part = np.asarray(cv2.blur(part, (max(1, round(0.7 / scale)),) * 2), np.uint8)
         matrix[:, 2] += scale * np.array([columns.start, rows.start])
         small = cv2.warpAffine(colours.map(part), matrix, (side, side), flags=cv2.INTER_LINEAR, borderValue=0.5)
-        contrast = cv2.filter2D(small, cv2.CV_32F, self._inside) - cv2.filter2D(small, cv2.CV_32F, self._around)
-        margin = CELLS_PER_WIDTH
-        contrast = contrast[margin:-margin, margin:-margin]
+        contrast = np.asarray(cv2.matchTemplate(small, self._kernel, cv2.TM_CCORR), np.float32)
         gx, gy = _grid(contrast.shape[0] // 2, CELLS_PER_WIDTH)
         score = contrast - np.float32(tightness) * (gx**2 + gy**2)
         row, column = np.unravel_index(int(np.argmax(score)), score.shape)

@@ -7,48 +7,89 @@ one blob.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float32]
-Density = NDArray[np.float32]
-Cells = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 CELL = 4  # pixels per cell of a density
 MOST_HYPOTHESES = 256
 
 
+class Cells(NamedTuple):
+    """Cells (rows, columns) under pixels, in row order, and the box (top, left, bottom, right) that holds them."""
+
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    box: tuple[int, int, int, int]
+
+
+class Density(NamedTuple):
+    """Share of hypotheses in each cell of a window whose corner is the cell (top, left); outside there are none."""
+
+    values: NDArray[np.float32]
+    top: int
+    left: int
+
+    def at(self, cells: Cells) -> NDArray[np.float32]:
+        """The density in each of these cells."""
+        (height, width), (top, left, bottom, right) = self.values.shape, cells.box
+        rows, columns = cells.rows - self.top, cells.columns - self.left
+        if top >= self.top and left >= self.left and bottom < self.top + height and right < self.left + width:
+            return self.values[rows, columns]
+        inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        found = np.zeros(len(rows), np.float32)
+        found[inside] = self.values[rows[inside], columns[inside]]
+        return found
+
+    def meets(self, cells: Cells) -> bool:
+        """Whether some of the cells may lie in the window."""
+        (height, width), (top, left, bottom, right) = self.values.shape, cells.box
+        return top < self.top + height and bottom >= self.top and left < self.left + width and right >= self.left
+
+
 def sample_pixels(mask: NDArray[np.uint8], x0: int, y0: int) -> Points:
     """At most MOST_HYPOTHESES pixels (N, 2) x, y of a mask window whose corner is at (x0, y0), evenly taken."""
-    rows, columns = np.nonzero(mask)
-    step = max(1, len(rows) // MOST_HYPOTHESES)
-    return np.stack([columns[::step] + x0, rows[::step] + y0], axis=1).astype(np.float32)
+    places = np.flatnonzero(mask != 0)
+    rows, columns = np.divmod(places[:: max(1, len(places) // MOST_HYPOTHESES)], mask.shape[1])
+    return np.stack([columns + x0, rows + y0], axis=1).astype(np.float32)
 
 
 def propagate(pixels: Points, dx: float, dy: float, sigma_px: float, height: int, width: int) -> Density:
     """Density of `pixels` moved by (dx, dy) and spread by `sigma_px`, per cell of CELL x CELL pixels; its sum is 1."""
     cells = ((pixels + np.array([dx, dy], np.float32)) / CELL).astype(np.int64)
-    rows, columns = height // CELL + 1, width // CELL + 1
-    inside = (cells[:, 0] >= 0) & (cells[:, 0] < columns) & (cells[:, 1] >= 0) & (cells[:, 1] < rows)
-    flat = cells[inside, 1] * columns + cells[inside, 0]
-    density = np.bincount(flat, minlength=rows * columns).reshape(rows, columns).astype(np.float32) / max(1, len(pixels))
-    side = (
-        2 * round(1.2 * min(max(0.7, sigma_px / CELL), 20.0)) + 1
-    )  # two boxes are nearly a Gaussian, and cost the same at any width
-    once = cv2.blur(density, (side, side), borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(cv2.blur(once, (side, side), borderType=cv2.BORDER_CONSTANT), np.float32)
+    most = np.array([width // CELL, height // CELL])
+    cells = cells[np.all((cells >= 0) & (cells <= most), axis=1)]
+    if not len(cells):
+        return Density(np.zeros((0, 0), np.float32), 0, 0)
+    half = round(1.2 * min(max(0.7, sigma_px / CELL), 20.0))
+    # Only as far as they spread.
+    (left, top), (right, bottom) = np.maximum(cells.min(axis=0) - 2 * half, 0), np.minimum(cells.max(axis=0) + 2 * half, most)
+    rows, columns = int(bottom - top) + 1, int(right - left) + 1
+    flat = (cells[:, 1] - top) * columns + cells[:, 0] - left
+    shares = np.bincount(flat, minlength=rows * columns).reshape(rows, columns).astype(np.float32) / max(1, len(pixels))
+    # Two boxes are nearly a Gaussian, and cost the same at any width.
+    side = 2 * half + 1
+    once = cv2.blur(shares, (side, side), borderType=cv2.BORDER_CONSTANT)
+    spread = np.asarray(cv2.blur(once, (side, side), borderType=cv2.BORDER_CONSTANT), np.float32)
+    return Density(spread, int(top), int(left))
 
 
 def cells_of(mask: NDArray[np.uint8], x0: int, y0: int) -> Cells:
-    """Cells (rows, columns) of a density under the set pixels of a window with its corner at (x0, y0), in row order."""
-    rows, columns = np.nonzero(mask)
-    return (rows + y0) // CELL, (columns + x0) // CELL
+    """Cells of a density under the set pixels of a window with its corner at (x0, y0), in row order."""
+    places = cv2.findNonZero(mask)
+    if places is None:
+        return Cells(np.empty(0, np.int32), np.empty(0, np.int32), (0, 0, -1, -1))
+    columns, rows = (np.asarray((places[:, 0, k] + corner) // CELL, np.int32) for k, corner in enumerate((x0, y0)))
+    return Cells(rows, columns, (int(rows[0]), int(columns.min()), int(rows[-1]), int(columns.max())))
 
 
 def support(density: Density, cells: Cells) -> float:
     """Share of a track's hypotheses that fall on the observed pixels, 0 to 1."""
-    return float(min(1.0, density[cells].sum() / CELL**2))
+    return float(min(1.0, density.at(cells).sum() / CELL**2)) if density.meets(cells) else 0.0
 
 
 def best_tracks(supports: NDArray[np.float64], least: float) -> list[list[int]]:

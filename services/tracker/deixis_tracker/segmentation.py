@@ -80,7 +80,7 @@ def hand_blobs(
 
 def _refined(mask: Mask, x: int, y: int, evidence: float, sure: float, image: Image, skin_model: SkinModel, low: int) -> Blob:
     """A coarse region at full resolution: what surely lies inside stays, pixels about its edge are judged one by one."""
-    padded = np.pad(mask, 1)
+    padded = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
     inside = cv2.resize(cv2.erode(padded, EDGE, borderValue=0), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     reach = cv2.resize(cv2.dilate(padded, EDGE), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     x0, y0 = max(0, 2 * (x - 1)), max(0, 2 * (y - 1))

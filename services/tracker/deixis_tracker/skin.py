@@ -9,6 +9,7 @@ of the brightness as a weak third axis. The densities of skin and of everything 
 from __future__ import annotations
 
 from functools import cache
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ from deixis_tracker.frame import Image, Mask
 from deixis_tracker.skin_prior import OTHER, SKIN, Gaussian
 
 Array = NDArray[np.float64]
+T = TypeVar("T", bound=np.generic)
 
 BINS = 32
 OFFSET = 6.0  # keeps the ratios of dark pixels, which are mostly noise, near 1
@@ -28,36 +30,48 @@ ROOM_SHARE = 0.5
 CLOTHES_SHARE = 0.35
 # A palm held toward a lamp runs into the limit of the sensor and turns nearly white: it may extend a blob, not start one.
 OVEREXPOSED_SKIN = 0.45
+GREY_LEVELS, GREY_SHARE = 6, 0.995  # channels that differ so little, in so much of the picture: no colour
 
 
 def chroma_features(bgr: Array) -> Array:
     """(N, 3) colours -> (N, 3): log(R/G), log(G/B), log brightness."""
     b, g, r = (bgr.T + OFFSET)[:3]
-    return np.stack([np.log(r / g), np.log(g / b), np.log((r + g + b) / 3)], axis=1)
+    return np.stack(
+        [np.log(r / g), np.log(g / b), np.log((r + g + b) / 3)]
+    ).T  # each axis in a row: they are quicker to go over
 
 
 def gaussian_densities(x: Array, mean: Array, covariance: Array) -> Array:
     """Densities of a Gaussian at (N, D) points."""
-    offset = x - mean
-    inverse = np.linalg.inv(covariance)
-    distance = ((offset @ inverse) * offset).sum(axis=1)
+    offset = (x - mean).T
+    # Not by @, which starts threads for so long a product.
+    distance = np.einsum("dn,dn->n", np.einsum("de,en->dn", np.linalg.inv(covariance), offset), offset)
     norm = np.sqrt((2 * np.pi) ** x.shape[1] * np.linalg.det(covariance))
     return np.asarray(np.exp(-0.5 * distance) / norm, np.float64)
 
 
-def look_up(table: Image, image: Image) -> Image:
-    """`table` (N, N, N) uint8 over B, G, R, N a power of two up to 32, applied to (H, W, 3): (H, W) uint8.
+def is_grey(image: Image) -> bool:
+    """Whether a picture (H, W, 3) has no colour, which says then nothing of skin."""
+    some = image[::4, ::4].astype(np.int16)
+    return float(np.mean(np.ptp(some, axis=2) <= GREY_LEVELS)) >= GREY_SHARE
 
-    cv2.calcBackProject cannot do it: the Python binding takes a table of three dimensions for one of two with channels.
+
+def colour_table(values: NDArray[T]) -> NDArray[T]:
+    """`values` (N, N, N) over B, G, R, N a power of two up to 32, as `look_up` takes them."""
+    fine = values
+    for axis in range(3):
+        fine = fine.repeat(BINS // values.shape[axis], axis)
+    return np.ascontiguousarray(fine.transpose(2, 1, 0)).ravel()
+
+
+def look_up(table: NDArray[T], image: Image) -> NDArray[T]:
+    """A `colour_table` applied to (H, W, 3): (H, W). It runs on every pixel of every frame.
+
+    OpenCV packs a colour into 15 bits, five of each channel, red the highest. (cv2.calcBackProject cannot do it: the Python
+    binding takes a table of three dimensions for one of two with channels.)
     """
-    bits = table.shape[0].bit_length() - 1
-    # One 16-bit number per colour, built with in-place integer operations: this runs on every pixel of every frame.
-    index = image[..., 0].astype(np.uint16)
-    index >>= 8 - bits
-    for channel in (1, 2):
-        index <<= bits
-        index |= image[..., channel] >> (8 - bits)
-    return np.asarray(np.take(table.ravel(), index, mode="clip"), np.uint8)
+    packed = cv2.cvtColor(image, cv2.COLOR_BGR2BGR555).view(np.uint16)
+    return np.asarray(np.take(table, packed[..., 0], mode="clip"))
 
 
 def _mixture(x: Array, parts: tuple[Gaussian, ...]) -> Array:
@@ -148,7 +162,7 @@ class SkinModel:
         counts = cv2.calcHist([image], [0, 1, 2], mask, [BINS] * 3, [0, 256] * 3).astype(np.float64)
         if counts.sum() < 100:
             return None
-        return np.asarray((_smooth(counts) / counts.sum()).ravel() / self._volume, np.float64)
+        return np.asarray((smoothed(counts, 0.25) / counts.sum()).ravel() / self._volume, np.float64)
 
     def forget_person(self, person_id: int) -> None:
         """Drop the colour of a person who left."""
@@ -170,7 +184,7 @@ class SkinModel:
         posterior = joint / np.maximum(joint + (1 - self._prior) * other, 1e-12)
         if self._person:
             posterior = np.where(self._overexposed, np.maximum(posterior, OVEREXPOSED_SKIN), posterior)
-        return (255 * posterior).reshape(BINS, BINS, BINS).astype(np.uint8)
+        return colour_table((255 * posterior).reshape(BINS, BINS, BINS).astype(np.uint8))
 
     def _cell_volume(self) -> Array:
         """Volume of each table cell in feature space; the Jacobian of the three logs is 1 / (R G B)."""
@@ -178,28 +192,30 @@ class SkinModel:
         return np.asarray((256 / BINS) ** 3 / (r * g * b), np.float64)
 
 
-def _smooth(counts: Array) -> Array:
-    for axis in range(3):
-        moved = np.moveaxis(counts, axis, 0)
-        padded = np.concatenate([moved[:1], moved, moved[-1:]])
-        counts = np.moveaxis(0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:], 0, axis)
-    return counts
+def smoothed(counts: Array, beside: float) -> Array:
+    """A histogram (N, N, N) of which each bin gives the share `beside` to both its neighbours along each axis.
+
+    What the outermost bins would give away, they keep. (Products of matrices would do it, but numpy's start threads.)
+    """
+    kernel, bins = np.array([beside, 1 - 2 * beside, beside]), counts.shape[0]
+    two = cv2.sepFilter2D(counts, -1, kernel, kernel, borderType=cv2.BORDER_REPLICATE)
+    three = cv2.sepFilter2D(two.reshape(-1, bins), -1, kernel, np.ones(1), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(three.reshape(counts.shape), np.float64)
 
 
-def hysteresis(
-    probability: Image, low: int, high: int, min_area: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32], list[int]]:
+def hysteresis(probability: Image, low: int, high: int, min_area: int) -> tuple[NDArray[Any], NDArray[np.int32], list[int]]:
     """Connected components of probability >= `low` that hold a pixel >= `high` and at least `min_area` pixels.
 
     Returns (labels, stats, kept): labels (H, W), stats as of cv2.connectedComponentsWithStats, and the labels kept.
     """
     weak = np.asarray(probability >= low, np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(weak, connectivity=8)
-    large = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] >= min_area]
+    # Regions have four pixels each at least, with those between them; short labels are quicker.
+    short = weak.size < 4 * np.iinfo(np.uint16).max
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(weak, connectivity=8, ltype=cv2.CV_16U if short else cv2.CV_32S)
     kept = []
-    for k in large:
+    for k in (int(k) for k in 1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] >= min_area)):
         x, y, w, h = stats[k, :4]
         window = np.s_[y : y + h, x : x + w]
         if np.any((labels[window] == k) & (probability[window] >= high)):
             kept.append(k)
-    return np.asarray(labels, np.int32), np.asarray(stats, np.int32), kept
+    return labels, np.asarray(stats, np.int32), kept

@@ -33,26 +33,27 @@ class Glimpse:
     seen_ns: int
 
     @classmethod
-    def of(cls, grey: Image, x: float, y: float, width: float, now_ns: int) -> Glimpse | None:
-        """The surroundings of a head at (x, y) of the grey picture; none where they are not whole in it, or even."""
+    def of(cls, picture: Image, x: float, y: float, width: float, now_ns: int) -> Glimpse | None:
+        """The surroundings of a head at (x, y) of the picture (H, W, 3); none where they are not whole in it, or even."""
         half = HALF * width
-        return cls._in(grey, around(x, y, half, half, half, half), now_ns)
+        return cls._in(picture, around(x, y, half, half, half, half), now_ns)
 
     @classmethod
-    def _in(cls, grey: Image, box: Box, now_ns: int) -> Glimpse | None:
-        rows, columns = box.window(*grey.shape)
-        part = grey[rows, columns]
-        if min(part.shape) < 0.95 * box.w or min(part.shape) < 4:
+    def _in(cls, picture: Image, box: Box, now_ns: int) -> Glimpse | None:
+        rows, columns = box.window(*picture.shape[:2])
+        part = picture[rows, columns]
+        if min(part.shape[:2]) < 0.95 * box.w or min(part.shape[:2]) < 4:
             return None
-        picture = cv2.resize(part, (CELLS, CELLS), interpolation=cv2.INTER_AREA).astype(np.float32)
-        picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), BLUR_CELLS), np.float32)
-        return cls(box, picture, now_ns) if float(picture.std()) >= LEAST_LEVELS else None
+        grey = cv2.cvtColor(part, cv2.COLOR_BGR2GRAY)
+        cells = cv2.resize(grey, (CELLS, CELLS), interpolation=cv2.INTER_AREA).astype(np.float32)
+        cells = np.asarray(cv2.GaussianBlur(cells, (0, 0), BLUR_CELLS), np.float32)
+        return cls(box, cells, now_ns) if float(cells.std()) >= LEAST_LEVELS else None
 
-    def sways(self, grey: Image, now_ns: int) -> bool:
+    def sways(self, picture: Image, now_ns: int) -> bool:
         """Whether the place has moved since by as much as people who stand do."""
         if now_ns - self.seen_ns < APART_S * 1e9:
             return False
-        now = self._in(grey, self.box, now_ns)
+        now = self._in(picture, self.box, now_ns)
         if now is None:
             return False
         shift_cells, explained = _shift(self.picture, now.picture)

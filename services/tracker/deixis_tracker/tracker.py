@@ -24,12 +24,12 @@ from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.head_tracks import HeadTracks
 from deixis_tracker.persons import people_mask, tracks_of
 from deixis_tracker.segmentation import hand_blobs
-from deixis_tracker.skin import SkinModel
+from deixis_tracker.skin import SkinModel, is_grey
 
 LEAST_SIDE_PX = 32
 LONGEST_STEP_NS = 500_000_000
 FIRST_NS = 33_333_333  # the first frame of a run ends so late in it
-GREY_LEVELS, GREY_SHARE, GREY_CHECKED_S = 6, 0.995, 0.5  # channels that differ so little, in so much of the picture: no colour
+GREY_CHECKED_S = 0.5
 LEARN_ROOM_S, LEARN_ROOM_AHEAD_S = 1.5, 35 / 30  # the first time after a third of a second
 
 
@@ -85,7 +85,7 @@ class Tracker:
     def _reset(self, work: Image) -> None:
         size = work.shape[0], work.shape[1]
         coarse = coarsened(work)
-        self.is_grey = _is_grey(coarse)
+        self.is_grey = is_grey(coarse)
         self._camera = CameraMotion(coarse)
         self._room = Background(coarse, self._config.change_threshold)
         self._motion = MotionHistory(coarse)
@@ -97,7 +97,7 @@ class Tracker:
     def _step(self, image: Image, work: Image, scale: float, step: Step) -> None:
         coarse = coarsened(work)
         if step.periods(GREY_CHECKED_S):
-            self.is_grey = _is_grey(coarse)
+            self.is_grey = is_grey(coarse)
         self._follow_camera(coarse, step)
         views = self._view(image, work, coarse, scale)
         self._heads.update(views, self._room, self._motion, self._skin, step)
@@ -124,14 +124,7 @@ class Tracker:
             self._people = people_mask(self._heads.persons, (coarse.shape[0], coarse.shape[1]))
 
     def _view(self, image: Image, work: Image, coarse: Image, scale: float) -> Views:
-        grey = np.asarray(cv2.cvtColor(work, cv2.COLOR_BGR2GRAY), np.uint8)
         changed = self._room.changed(coarse, self._people)
         # A face of no colour would teach that all that is as bright is skin.
         skin = np.zeros(coarse.shape[:2], np.uint8) if self.is_grey else self._skin.probability(coarse)
-        return Views(image, scale, work, grey, coarse, skin, changed)
-
-
-def _is_grey(coarse: Image) -> bool:
-    """Whether the channels of a picture (H, W, 3) are the same."""
-    some = coarse[::4, ::4].astype(np.int16)
-    return float(np.mean(np.ptp(some, axis=2) <= GREY_LEVELS)) >= GREY_SHARE
+        return Views(image, scale, work, coarse, skin, changed)
