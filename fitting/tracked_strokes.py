@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from deixis_evaluation.clips import Clip, TruePerson, Truth
-from deixis_evaluation.recording import Recording
-from deixis_evaluation.replay import RUN, Given
-from deixis_evaluation.tracker_play import play_tracker
+from deixis_evaluation.replay import Given, replay_tracker
 from deixis_gesture.config import GestureConfig
 from deixis_gesture.pointing_odds import Measures
 from deixis_gesture.recognizer import GestureRecognizer
 from deixis_runtime.lens import Lens
-from deixis_schemas.messages import Track
-from deixis_tracker.config import TrackerConfig
+from deixis_schemas.messages import Track, Tracks
 
 NEAR_FACE_WIDTHS = 0.7
 """A hand track nearer than this to a true hand is that hand."""
@@ -40,20 +37,19 @@ def strokes_of(clips: Sequence[Clip]) -> Iterator[SeenStroke]:
     """All frames of all strokes of these clips."""
     first = 0
     for clip in clips:
-        played = list(_of_clip(clip, play_tracker(clip, TrackerConfig(), lambda: None)[0], first))
+        played = list(_of_clip(Given(clip), first))
         first = max((seen.number + 1 for seen in played), default=first)
         yield from played
 
 
-def _of_clip(clip: Clip, recording: Recording, first: int) -> Iterator[SeenStroke]:
-    given, recognizer = Given(clip), GestureRecognizer(GestureConfig())
-    camera = given.camera()
-    lens, size = Lens.of(camera), (clip.truth.meta.width, clip.truth.meta.height)
+def _of_clip(given: Given, first: int) -> Iterator[SeenStroke]:
+    clip, recognizer = given.clip, GestureRecognizer(GestureConfig())
+    lens, mount = Lens.of(given.camera()), given.camera().mount
     numbers: dict[int, int] = {}
-    for frame in clip.truth.frames:
-        tracks, stamp_ns = recording.tracks_at(frame.frame), given.frame(frame.frame).stamp_ns
-        recognizer.update(tracks, *size, lens, RUN, stamp_ns, mount=camera.mount)
-        by_id = {track.track_id: track for track in tracks}
+    for frame, seen in zip(clip.truth.frames, Given(clip, replay_tracker(given)).of(Tracks), strict=True):
+        size, offset = (seen.width, seen.height), seen.room_offset_px
+        recognizer.update(seen.tracks, *size, lens, seen.run, seen.stamp_ns, offset, mount)
+        by_id = {track.track_id: track for track in seen.tracks}
         for arm in (arm for person in recognizer.persons.values() for arm in person.arms):
             if arm.track_id not in by_id or not arm.verdict.measures:
                 numbers.pop(id(arm), None)

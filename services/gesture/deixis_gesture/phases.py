@@ -123,7 +123,13 @@ class PhaseTracker:
         slack = 0.25 if self.raised else 0.0
         beside = abs(place[0]) >= self._config.beside_body - slack
         limit = self._config.raised_beside_below_face if beside else self._config.raised_below_face
-        return place[1] <= limit + slack
+        return place[1] <= limit + slack or self._has_come_up(place, slack)
+
+    def _has_come_up(self, place: tuple[float, float], slack: float) -> bool:
+        """From where it rested, though not as high as others: one pointing in seven, from the hip or to something low."""
+        if self._departure is None or place[1] > self._config.lowest_raised + slack:
+            return False
+        return self._departure[1][1] - place[1] >= self._config.raised_from_rest - slack
 
     def _following(self, vx: float, vy: float, leaving: float) -> Phase:
         speed = math.hypot(vx, vy)
