@@ -116,7 +116,7 @@ def _draw_room(axes: Axes, room: Room, drawn: Arrangements) -> None:
         colour = VISIBLE if drawn.visible[0, i] else GREY
         axes.plot(*place, "o", color=colour, markersize=9, markeredgecolor=PAPER, zorder=3)
         outward = 0.5 * np.sign(np.where(np.abs(place - centre) > 0.35 * (high - low), place - centre, 0.0))
-        shift = outward if outward.any() else np.array([-0.55, 0.0])
+        shift = outward if outward.any() else np.array([-0.1, 0.55])
         x, y = place + shift
         axes.text(x, y, f"P{i + 1}", ha="center", va="center", fontsize=9, color=INK)
     robot, person, meant = drawn.robot[0], drawn.person[0], room.poi_positions[drawn.meant[0]]
