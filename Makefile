@@ -17,7 +17,9 @@ setup: .venv/.installed
 	@echo "setting up .venv (about a minute) ..."
 	@$(PYTHON) -m venv .venv
 	@$(PIP) hatchling editables
-	@$(PIP) --no-build-isolation -r requirements-dev.txt $(foreach d,$(DISTRIBUTIONS),-e $(d))
+	@# Built in isolation: py-dempster-shafer comes as source, and needs setuptools with wheel.
+	@$(PIP) -r requirements-dev.txt
+	@$(PIP) --no-build-isolation $(foreach d,$(DISTRIBUTIONS),-e $(d))
 	@touch $@
 
 # The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]

@@ -47,6 +47,10 @@ class Arrangements:
         """Bearing of the POI meant (t)."""
         return self.bearing_deg[np.arange(len(self)), self.meant]
 
+    def part(self, rows: slice) -> Arrangements:
+        """Some of them."""
+        return Arrangements(self.robot[rows], self.person[rows], self.bearing_deg[rows], self.visible[rows], self.meant[rows])
+
 
 class _Pairs(NamedTuple):
     robot: Values
@@ -62,7 +66,7 @@ def draw(room: Room, count: int, rng: np.random.Generator, limits_m: Limits = (N
     missing = count
     while missing:
         candidates = _seen(room, _pairs(room, OVERSHOOT * missing + 64, limits_m, rng), rng)
-        found.append(_part(candidates, slice(missing)))
+        found.append(candidates.part(slice(missing)))
         missing -= len(found[-1])
     return _joined(found)
 
@@ -117,10 +121,6 @@ def _seen(room: Room, pairs: _Pairs, rng: np.random.Generator) -> Arrangements:
     bearings = np.degrees(np.angle(to_pois * to_robot.conj()[:, None]))
     meant = np.argmax(np.where(visible, rng.random(visible.shape), -1.0), axis=1)
     return Arrangements(robot, person, bearings, visible, meant)
-
-
-def _part(of: Arrangements, rows: slice) -> Arrangements:
-    return Arrangements(of.robot[rows], of.person[rows], of.bearing_deg[rows], of.visible[rows], of.meant[rows])
 
 
 def _joined(parts: list[Arrangements]) -> Arrangements:

@@ -1,7 +1,8 @@
 """The three simulated environments of section 7.2, reconstructed: the paper shows them in figures 7 and 8 only.
 
 A: one rectangular room with four POIs on its walls. B: the same with eight. C: five rooms and a corridor that joins them, with
-eight POIs, of which robot and person never see more than three together. Metres; walls are segments, POIs hang on them.
+eight POIs, of which robot and person never see more than three together. Metres; walls are segments. POIs hang on outer
+walls; before an inner one they stand 0.2 m off it, so that they are seen from one side alone.
 """
 
 from __future__ import annotations
@@ -90,6 +91,6 @@ ROOM_C = Room(
         *(((x, 7.0), (x, 11.0)) for x in (5.0, 10.0)),
         ((7.5, 0.0), (7.5, 5.0)),
     ),
-    ((0.0, 8.0), (5.0, 9.0), (7.5, 11.0), (15.0, 9.0), (0.0, 2.5), (3.75, 0.0), (7.5, 2.5), (15.0, 2.5)),
+    ((0.0, 8.0), (4.8, 9.0), (7.5, 11.0), (15.0, 9.0), (0.0, 2.5), (3.75, 0.0), (7.3, 2.5), (15.0, 2.5)),
 )
 ROOMS = (ROOM_A, ROOM_B, ROOM_C)

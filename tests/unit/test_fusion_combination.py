@@ -51,7 +51,7 @@ def test_the_order_of_the_sources_does_not_matter(rule: Rule, sources: list[Beli
 @given(source=assignments())
 def test_one_source_is_itself(rule: Rule, source: BeliefAssignment) -> None:
     assert mass_gap(rule([source]).belief, source) < 1e-12
-    assert rule([source]).conflict == 0.0
+    assert rule([source]).conflict == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("rule", [dempster, yager], ids=["dempster", "yager"])

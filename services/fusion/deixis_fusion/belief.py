@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 # Below this, what the sources agree on is rounding noise, and eq. 14 would divide by it.
 TOTAL_CONFLICT = 1e-12
+# What masses, and their sum, may be off by.
+MOST_MASS = 1 + 1e-9
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -25,15 +28,25 @@ class BeliefAssignment:
         """Raises ValueError where the masses break eqs 11 and 12."""
         if self.size < 1:
             raise ValueError("size: a frame of discernment needs at least one hypothesis")
-        everything = everything_of(self.size)
+        everything, masses = everything_of(self.size), self.masses
+        if not (
+            masses
+            and min(masses) > 0
+            and max(masses) <= everything
+            and min(masses.values()) >= 0
+            and max(masses.values()) <= MOST_MASS
+            and abs(math.fsum(masses.values()) - 1) <= ROUNDING
+        ):
+            self._complain(everything)
+
+    def _complain(self, everything: int) -> None:
+        """Say what is wrong; a loop in Python, which all assignments that are right are spared."""
         for subset, mass in self.masses.items():
             if subset <= 0 or subset > everything:
                 raise ValueError(f"masses: {subset:#x} is not a non-empty set of {self.size} hypotheses")
-            if not 0 <= mass <= 1 + 1e-9:
+            if not 0 <= mass <= MOST_MASS:
                 raise ValueError(f"masses: the mass of {subset:#x} is {mass}, not within 0 and 1")
-        total = math.fsum(self.masses.values())
-        if abs(total - 1) > 1e-6:
-            raise ValueError(f"masses: they sum to {total}, not to 1")
+        raise ValueError(f"masses: they sum to {math.fsum(self.masses.values())}, not to 1")
 
     @property
     def unknown(self) -> float:
@@ -132,14 +145,14 @@ def combine(first: BeliefAssignment, second: BeliefAssignment) -> Combination:
     """
     if first.size != second.size:
         raise ValueError(f"the frames differ: {first.size} and {second.size} hypotheses")
-    joint = _intersections(first.masses, second.masses)
+    joint = intersections(first.masses, second.masses)
     agreement = math.fsum(joint.values())
     if agreement < TOTAL_CONFLICT:
         return Combination(vacuous(first.size), 1.0)
     return Combination(normalised(first.size, joint), min(1.0, max(0.0, 1.0 - agreement)))
 
 
-def _intersections(first: Mapping[int, float], second: Mapping[int, float]) -> dict[int, float]:
+def intersections(first: Mapping[int, float], second: Mapping[int, float]) -> dict[int, float]:
     """Unnormalised masses of the non-empty intersections, the sum in eq. 14.
 
     A singleton meets another only when they are equal, so pairs of singletons are looked up, not tried: with n POIs that is
@@ -149,26 +162,37 @@ def _intersections(first: Mapping[int, float], second: Mapping[int, float]) -> d
     small, large = _split(first)
     other_small, other_large = _split(second)
     for subset, mass in small.items():
-        hit = mass * other_small.get(subset, 0.0)
-        hit += mass * sum(other for focal, other in other_large.items() if focal & subset)
-        _add(joint, subset, hit)
+        met = other_small.get(subset, 0.0)
+        for focal, other in other_large:
+            if focal & subset:
+                met += other
+        if mass * met > 0:
+            joint[subset] = mass * met
     for subset, mass in other_small.items():
-        _add(joint, subset, mass * sum(other for focal, other in large.items() if focal & subset))
-    for subset, mass in large.items():
-        for focal, other in other_large.items():
-            _add(joint, subset & focal, mass * other)
+        met = 0.0
+        for focal, other in large:
+            if focal & subset:
+                met += other
+        if mass * met > 0:
+            joint[subset] = joint.get(subset, 0.0) + mass * met
+    for subset, mass in large:
+        for focal, other in other_large:
+            both = subset & focal
+            if both and mass * other > 0:
+                joint[both] = joint.get(both, 0.0) + mass * other
     return joint
 
 
-def _split(masses: Mapping[int, float]) -> tuple[dict[int, float], dict[int, float]]:
-    single = {subset: mass for subset, mass in masses.items() if not subset & (subset - 1)}
-    compound = {subset: mass for subset, mass in masses.items() if subset & (subset - 1)}
+def _split(masses: Mapping[int, float]) -> tuple[dict[int, float], list[tuple[int, float]]]:
+    """Singletons, and the larger sets."""
+    single: dict[int, float] = {}
+    compound: list[tuple[int, float]] = []
+    for subset, mass in masses.items():
+        if subset & (subset - 1):
+            compound.append((subset, mass))
+        else:
+            single[subset] = mass
     return single, compound
-
-
-def _add(masses: dict[int, float], subset: int, mass: float) -> None:
-    if subset and mass > 0:
-        masses[subset] = masses.get(subset, 0.0) + mass
 
 
 def _share(masses: Iterable[float]) -> float:

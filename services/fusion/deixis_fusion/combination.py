@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from typing import Literal
 
-from .belief import BeliefAssignment, Combination, combine, everything_of, normalised
+from .belief import BeliefAssignment, Combination, combine, everything_of, intersections, normalised
 
 RuleName = Literal["dempster", "yager", "dubois_prade", "pcr6"]
 Rule = Callable[[Sequence[BeliefAssignment]], Combination]
@@ -38,11 +38,13 @@ def dempster(sources: Sequence[BeliefAssignment]) -> Combination:
 
 def yager(sources: Sequence[BeliefAssignment]) -> Combination:
     """Yager's rule: conflict is ignorance. Raises ValueError."""
-    together = dempster(sources)
-    everything = everything_of(sources[0].size)
-    kept = {subset: mass * (1.0 - together.conflict) for subset, mass in together.belief.masses.items()}
-    kept[everything] = kept.get(everything, 0.0) + together.conflict
-    return Combination(normalised(sources[0].size, kept), together.conflict)
+    _check(sources)
+    size, met = sources[0].size, dict(sources[0].masses)
+    for source in sources[1:]:
+        met = intersections(met, source.masses)
+    conflict = _share(1.0 - math.fsum(met.values()))
+    met[everything_of(size)] = met.get(everything_of(size), 0.0) + conflict
+    return Combination(normalised(size, met), conflict)
 
 
 def dubois_prade(sources: Sequence[BeliefAssignment]) -> Combination:
