@@ -34,7 +34,7 @@ from tracked_strokes import SeenStroke, strokes_of
 OUT = Path(__file__).resolve().parents[1] / "services/gesture/deixis_gesture/pointing.npz"
 TIMES = 4
 """Every hand is cut out so often, each time worse in another way."""
-FRAME_STIFFNESS, STROKE_STIFFNESS = Stiffness(0.3, 0.03), Stiffness(1.0, 0.1)
+FRAME_STIFFNESS, STROKE_STIFFNESS = Stiffness(0.3, 0.03), Stiffness(0.3, 0.03)
 TRIED = (Stiffness(0.3, 0.03), Stiffness(1.0, 0.03), Stiffness(1.0, 0.1), Stiffness(3.0, 0.1), Stiffness(3.0, 0.3))
 
 

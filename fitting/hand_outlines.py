@@ -22,6 +22,8 @@ FACE_MISSED, WIDTH_MISSED = 0.1, 0.1
 FOREARM, BITTEN, FELLOW_SEEN, RIGHT_SIDE = 0.25, 0.12, 0.7, 0.9
 """Shares of hands with some of the forearm, of those from which something is missing, of other hands that are tracked, and of
 hands whose side is known."""
+CLOSED = (0.06, 0.3)
+"""Width of gaps that are closed, face widths: between the fingers of an open hand they are as wide as a finger, .12."""
 MARGIN_PX = 12
 
 
@@ -52,7 +54,7 @@ def _margin_px(face: Face) -> int:
 
 
 def _cut_out(known: KnownHand, face: Face, rng: np.random.Generator) -> Pixels:
-    mask = _coarse(np.pad(known.hand.astype(np.uint8), _margin_px(face)), rng)
+    mask = _coarse(np.pad(known.hand.astype(np.uint8), _margin_px(face)), face.width_px, rng)
     rows, columns = np.nonzero(mask)
     if not len(rows):
         return mask
@@ -65,19 +67,21 @@ def _cut_out(known: KnownHand, face: Face, rng: np.random.Generator) -> Pixels:
     return mask
 
 
-def _coarse(mask: Pixels, rng: np.random.Generator) -> Pixels:
-    """Edges a pixel off, thin fingers lost, gaps between fingers closed; or as it is."""
+def _coarse(mask: Pixels, face_px: float, rng: np.random.Generator) -> Pixels:
+    """Edges a pixel off, thin fingers lost, gaps between fingers closed (trackers mostly do that); or as it is."""
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     square = np.ones((3, 3), np.uint8)
     kind = rng.random()
-    if kind < 0.2:
+    if kind < 0.1:
         return np.asarray(cv2.dilate(mask, cross), np.uint8)
-    if kind < 0.35:
+    if kind < 0.2:
         return np.asarray(cv2.erode(mask, cross), np.uint8)
-    if kind < 0.55:
+    if kind < 0.35:
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, square), np.uint8)
-    if kind < 0.7:
-        return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)), np.uint8)
+    if kind < 0.8:
+        gap = round(face_px * rng.uniform(*CLOSED)) | 1
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (gap, gap))
+        return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, disc), np.uint8)
     return mask
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from deixis_gesture.fingertips import find_fingers
 from deixis_gesture.hand import Face, hand_of, unpack_contour
-from deixis_gesture.rules import PaperStroke, vote
+from deixis_gesture.paper_stroke import PaperStroke
+from deixis_gesture.rules import vote
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

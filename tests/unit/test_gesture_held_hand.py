@@ -70,8 +70,7 @@ def test_every_measure_has_a_table():
     hand = held_hand(_shape((2.5, 1.0), (3.1, 0.9)), [], "left", (-1.1, 4.2))
     alone = held_hand(_shape((2.5, 1.0), (3.1, 0.9)), [], "left", None)
     assert set(frame_measures(hand)) | set(frame_measures(alone)) == set(FRAME_KNOTS)
-    coming = stroke_measures(0.0, 0.5, 0.02, Way(0.6, 3.0, 1.0), found_raised=False)
-    found = stroke_measures(0.0, 0.5, 0.02, None, found_raised=True)
+    coming, found = stroke_measures(0.0, 0.5, 0.02, Way(0.6, 3.0, 1.0)), stroke_measures(0.0, 0.5, 0.02, None)
     assert set(coming) | set(found) == set(STROKE_KNOTS)
 
 

@@ -14,8 +14,8 @@ from .deixis_stroke import DeixisStroke
 from .fingertips import Finger, find_fingers
 from .hand import CHEST, Face, HandShape, hand_of, unpack_contour
 from .held_hand import held_hand
+from .paper_stroke import PaperStroke
 from .phases import PhaseTracker
-from .rules import PaperStroke
 from .stroke import Look, StrokeRules, Verdict
 
 Point = tuple[float, float]

@@ -13,15 +13,20 @@ from deixis_schemas.messages import Side
 
 from .fingertips import Finger
 from .hand import CHEST, HandShape
+from .rules import vote
 
 Point = tuple[float, float]
+
+OPEN_PALM = 0.75
+"""Breadth of a hand that shows its open palm, face widths; a fist with its finger is .5 to .6."""
 
 
 @dataclass(frozen=True)
 class HeldHand:
     """palm: out and down from the face's middle; tip: the same from the palm. palm_radius, breadth: of the largest circle in
     it, and of the square as large as it is. fingers: the lengths that stand out, the longest first. fellow: the person's other
-    hand, out (on its own side) and down from the face; none where it is not seen.
+    hand, out (on its own side) and down from the face; none where it is not seen. is_open: the paper's
+    rules see an open or upright hand.
     """
 
     palm: Point
@@ -30,6 +35,12 @@ class HeldHand:
     breadth: float
     fingers: tuple[float, ...]
     fellow: Point | None
+    is_open: bool = False
+
+    @property
+    def is_open_palm(self) -> bool:
+        """An open hand that shows its palm: of hands that point 2 in a hundred look so, of those that stop or wave 40 and 30."""
+        return self.is_open and self.breadth >= OPEN_PALM
 
     @property
     def reach(self) -> float:
@@ -64,4 +75,5 @@ def held_hand(hand: HandShape, fingers: Sequence[Finger], side: Side | None, fel
         math.sqrt(hand.area),
         tuple(finger.length for finger in fingers),
         None if fellow is None else (-sense * fellow[0], fellow[1]),
+        vote(hand, fingers) == "other",
     )

@@ -32,9 +32,8 @@ FRAME_KNOTS: Knots = {
     "alone": ((0.0,),),
 }
 """Where each table has values. place: palm, out and down. tip: from the palm. arm: reach, and bend in degrees. size: of the
-palm, and of the whole. fingers: the longest, and the next. spread: how many stand out, and
-how steeply the hand goes up. fellow: how far the other hand is from where it mirrors this one,
-and how far down it is; alone: it is not seen.
+palm, and of the whole. fingers: the longest, and the next. spread: how many stand out, and how steeply the hand goes up.
+fellow: how far the other hand is from where it mirrors this one, and how far down it is; alone: it is not seen.
 """
 STROKE_KNOTS: Knots = {
     "posture": ((-6.0, -4.0, -2.5, -1.0, 0.0, 1.0, 2.5, 4.0, 6.0),),
@@ -43,11 +42,9 @@ STROKE_KNOTS: Knots = {
     "way": ((-0.5, 0.5, 1.5, 2.5, 4.0), (-1.5, -0.5, 0.5, 1.5, 3.0)),
     "haste": ((0.1, 0.3, 0.6, 1.0, 2.0),),
     "unseen": ((0.0,),),
-    "found_raised": ((0.0,),),
 }
 """posture: mean log odds of the last frames. lasting: seconds since the hand stands. shaking: how far it strays, face widths.
-way, haste: up and aside from where it rested, and the seconds that took; unseen: it was not seen coming. found_raised: it was
-up when the person came into sight.
+way, haste: up and aside from where it rested, and the seconds that took; unseen: it was not seen coming.
 """
 
 
@@ -79,11 +76,9 @@ def frame_measures(hand: HeldHand) -> Measures:
     return {**measures, "fellow": (math.dist(hand.palm, hand.fellow), hand.fellow[1])}
 
 
-def stroke_measures(posture: float, lasting_s: float, shaking: float, way: Way | None, found_raised: bool) -> Measures:
+def stroke_measures(posture: float, lasting_s: float, shaking: float, way: Way | None) -> Measures:
     """What `stroke_odds` weighs; `posture`: mean log odds of the last frames."""
     measures: Measures = {"posture": (posture,), "lasting": (lasting_s,), "shaking": (shaking,)}
-    if found_raised:
-        measures["found_raised"] = (0.0,)
     if way is None:
         return {**measures, "unseen": (0.0,)}
     return {**measures, "way": (way.up, way.aside), "haste": (way.seconds,)}
