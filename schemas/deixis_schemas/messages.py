@@ -385,9 +385,20 @@ class Evidence(Part):
     masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_LISTED, description="The sets of largest mass.")
 
 
+class Excluded(Part):
+    """A POI that does not come into question for a person."""
+
+    poi_id: Name
+    reason: Text = Field(description="Why, e.g. 'behind a wall'.")
+
+
 CREDIBLE = (
     "The fewest POIs, the likeliest first, among which the one meant is with a probability of 0.9 (setting `answer.credible`); "
     "the first of them."
+)
+EXCLUDED = (
+    "POIs of the registry that do not come into question, and why: the first of them, the nearest to the person first. State "
+    "and Target have them, a Belief leaves them out."
 )
 CONTOUR_CONFLICT = (
     "1 - max over POIs of the product of hand's and head's likelihoods, each divided by its largest: 0 where both fit one POI, "
@@ -410,6 +421,8 @@ class PersonBelief(Part):
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
     credible_total: Count = Field(default=0, description="How many they are.")
+    excluded: list[Excluded] = Field(default_factory=list, max_length=MAX_LISTED, description=EXCLUDED)
+    excluded_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
 
@@ -434,6 +447,8 @@ class Target(OfFrame):
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
     credible_total: Count = Field(default=0, description="How many they are.")
+    excluded: list[Excluded] = Field(default_factory=list, max_length=MAX_LISTED, description=EXCLUDED)
+    excluded_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     reason: Text
     started_ns: Nanoseconds

@@ -264,6 +264,12 @@ def test_a_refused_edit_names_the_field_and_is_counted(
     assert (edits.rejections[0].key, edits.rejections[0].stamp_ns) == (asked.key, 5)
 
 
+def test_a_parameter_that_is_not_known_is_refused_and_nothing_done(edits: PoiEdits) -> None:
+    with pytest.raises(Refused, match=r"^operation: unknown parameter"):
+        edits.answer(query("deixis/r1/fusion/poi/door", operation="delete"), 0)
+    assert len(edits.answer(query("deixis/r1/fusion/poi/*", _timeout="1", format="json"), 0)) == 2
+
+
 def test_an_operation_that_is_not_known_is_refused(edits: PoiEdits) -> None:
     with pytest.raises(Refused, match=r"^op: 'drop'"):
         edits.answer(query(op="drop"), 0)

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from deixis_runtime.queries import Edit, Query, Refused, key_matches
+from deixis_runtime.queries import Edit, Query, Refused, check_names, key_matches
 from deixis_schemas.codec import MSGPACK, CodecError, Malformed, WrongType, WrongVersion, parse_json, unpack, validate
 from deixis_schemas.messages import MAX_TEXT, Message, Poi, RejectedEdit
 
@@ -14,6 +14,7 @@ from .registry import Change, Delete, Put, Registry, RegistryError
 
 KEPT_REJECTIONS = 16
 OPERATIONS = ("put", "delete")
+PARAMETERS = ("op",)
 MAX_BYTES = 64 << 10
 # What generic Zenoh clients send: JSON under its own label, as text, or without any.
 JSON_LABELS = ("", "application/json", "text/json", "text/plain", "zenoh/string", "zenoh/bytes")
@@ -62,6 +63,7 @@ class PoiEdits:
 
         A deleted POI is answered as it was. Raises Refused with the field's name.
         """
+        check_names(query.parameters, PARAMETERS)
         operation = query.parameters.get("op", "put" if query.payload else "")
         if not operation:
             keys = ((self._prefix + poi.poi_id, poi) for poi in self._registry.pois())

@@ -24,14 +24,16 @@ from .visibility import Candidate
 
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
 MAX_MEMBERS = 96
+BEHIND_A_WALL = "behind a wall"
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`."""
+    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`. So many `excluded` ones are named."""
 
     top: int
     poi_id: str | None = None
+    excluded: int = 0
 
 
 class PersonReport(NamedTuple):
@@ -58,6 +60,8 @@ class PersonReport(NamedTuple):
             contour_conflict=told.contour_conflict,
             credible=_credible(told.judgement),
             credible_total=len(told.judgement.credible) if told.judgement else 0,
+            excluded=_excluded(told, rows.poi_id, rows.excluded),
+            excluded_total=len(told.hidden) if rows.excluded else 0,
             evidence=_evidence(told, self.now_ns),
             episode_id=self.episode_id,
         )
@@ -92,6 +96,8 @@ class TargetReport:
             contour_conflict=told.contour_conflict,
             credible=_credible(told.judgement),
             credible_total=len(told.judgement.credible) if told.judgement else 0,
+            excluded=_excluded(told, rows.poi_id, MAX_LISTED),
+            excluded_total=len(told.hidden),
             evidence=_evidence(told, self.now_ns),
             reason=explain(told),
             started_ns=self.started_ns,
@@ -137,6 +143,15 @@ def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[PoiBelief]:
 def _credible(judgement: Judgement | None) -> list[str]:
     """The first of the credible set."""
     return [poi_at(judgement.seen, i).poi_id for i in judgement.credible[:MAX_LISTED]] if judgement else []
+
+
+def _excluded(told: Assessment, poi_id: str | None, most: int) -> list[messages.Excluded]:
+    """The nearest of the POIs that do not come into question, or the one asked for if it is among them."""
+    if poi_id is None:
+        named = told.nearest_hidden(most)
+    else:
+        named = [told.pois[i] for i in told.hidden.tolist() if told.pois[i].poi_id == poi_id][:most]
+    return [messages.Excluded(poi_id=poi.poi_id, reason=BEHIND_A_WALL) for poi in named]
 
 
 # --- evidence ---------------------------------------------------------------------------------------------------------

@@ -21,7 +21,6 @@ from .visibility import Candidate, Walls
 
 Values = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
-Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
 # With a distance known to a tenth, the bearing of a POI 0.6 m from the person goes in steps of 4 degrees, the sigma of a head;
@@ -120,12 +119,12 @@ class Lookout:
         self._clearance_m = clearance_m
         self._kept: tuple[Points, Walls] | None = None
         self._eye = (0.0, 0.0)
-        self._hidden: Flags = np.zeros(0, dtype=np.bool_)
+        self._hidden: Indices = np.zeros(0, dtype=np.intp)
         self._index: Indices = np.zeros(0, dtype=np.intp)
 
     @property
-    def hidden(self) -> Flags:
-        """Which of the POIs a wall hid when last looked for."""
+    def hidden(self) -> Indices:
+        """Which of the POIs a wall hid when last looked for, as places in their order."""
         return self._hidden
 
     def look(self, place: PersonPlace, points: Points, walls: Walls) -> Sight:
@@ -133,8 +132,8 @@ class Lookout:
         eye = (place.position_m[0], place.position_m[1])
         same = self._kept is not None and self._kept[0] is points and self._kept[1] is walls
         if not same or math.dist(eye, self._eye) > HELD_M:
-            self._hidden = walls.hide(eye, points.xy, self._clearance_m)
-            self._index = np.flatnonzero(~self._hidden)
+            hidden = walls.hide(eye, points.xy, self._clearance_m)
+            self._hidden, self._index = np.flatnonzero(hidden), np.flatnonzero(~hidden)
             self._kept, self._eye = (points, walls), eye
         return Sight(bearings_from(place, points, self._index), points, self._index)
 
