@@ -42,7 +42,12 @@ def encoding_of(type_: type[Message]) -> str:
 
 def encode(message: Message) -> bytes:
     """The message as a msgpack map."""
-    return bytes(msgpack.packb(message.model_dump(), use_bin_type=True))
+    return pack(message.model_dump())
+
+
+def pack(content: dict[str, Any]) -> bytes:
+    """Plain data as a msgpack map."""
+    return bytes(msgpack.packb(content, use_bin_type=True))
 
 
 def decode(type_: type[T], payload: bytes, encoding: str, *, max_bytes: int = 1 << 20) -> T:

@@ -21,6 +21,8 @@ MAX_SIDE_PX = 8192
 MAX_PERSONS = 32
 MAX_TRACKS = 96
 MAX_POIS = 1024
+MAX_REGISTERED = 10_000
+"""POIs that the registry holds; a message lists `MAX_POIS` of them at most."""
 MAX_CONTOUR_BYTES = 65536
 MAX_LISTED = 16
 MAX_TEXT = 2000
@@ -348,6 +350,8 @@ class Poi(Message):
     position_m: Position = Field(description="Centre in the map frame, x, y, z, metres.")
     extent_m: float = Field(default=0.5, ge=0, le=1000, description="Size across, metres.")
     tags: list[Annotated[str, Field(max_length=64)]] = Field(default_factory=list, max_length=32)
+    edited_by: Annotated[str, Field(max_length=128)] = Field(default="", description="Who put it there, where that was told.")
+    edited_ns: Nanoseconds = Field(default=0, description="When, by the registry's clock, which fills it in; 0 where unknown.")
 
 
 class PoiBelief(Part):

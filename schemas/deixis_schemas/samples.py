@@ -73,7 +73,15 @@ _PERSON = m.PersonBelief(
     evidence=_EVIDENCE,
     episode_id="edge-4-1",
 )
-_POI = m.Poi(poi_id="vase", name="the blue vase", position_m=(3.4, 1.67, 1.26), extent_m=0.3, tags=["ceramics"])
+_POI = m.Poi(
+    poi_id="vase",
+    name="the blue vase",
+    position_m=(3.4, 1.67, 1.26),
+    extent_m=0.3,
+    tags=["ceramics"],
+    edited_by="anna@desk",
+    edited_ns=STAMP_NS,
+)
 _ROBOT_POSE = m.RobotPose(stamp_ns=STAMP_NS, stage="robot", instance="base-1", x_m=1.0, y_m=-2.0, yaw_deg=90.0)
 
 SAMPLES: tuple[m.Message, ...] = (

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deixis_schemas.codec import CodecError, decode_json
-from deixis_schemas.messages import MAX_POIS, NAME_PATTERN, Poi
+from deixis_schemas.messages import MAX_REGISTERED, NAME_PATTERN, Poi
 
 FORMAT = 1
 BUSY_MS = 500
 MEMORY = ":memory:"
+BY_SITE = "site file"
+UNEDITED = {"edited_by": "", "edited_ns": 0}
 
 SCHEMA = """
 CREATE TABLE pois (poi_id TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT ROWID;
@@ -81,17 +83,19 @@ class Registry:
         """The POI of that id."""
         return self._pois.get(poi_id)
 
-    def apply(self, changes: Sequence[Change]) -> list[Poi | RegistryError]:
+    def apply(self, changes: Sequence[Change], *, all_or_none: bool = False) -> list[Poi | RegistryError]:
         """Make these changes in their order, as one transaction; on disk when this returns.
 
         Returns for each the POI as it is, or as it was where it is deleted; or why it is refused, as all are where the disk
-        refuses.
+        refuses. With `all_or_none` the first refusal is raised as RegistryError, and nothing is changed.
         """
         after, statements, results = dict(self._pois), list[Statement](), list[Poi | RegistryError]()
         for change in changes:
             try:
                 result, statement = _put(after, change.poi) if isinstance(change, Put) else _delete(after, change.poi_id)
             except RegistryError as error:
+                if all_or_none:
+                    raise
                 results.append(error)
             else:
                 results.append(result)
@@ -101,6 +105,8 @@ class Registry:
         try:
             self._commit(statements)
         except RegistryError as error:
+            if all_or_none:
+                raise
             return [error] * len(results)
         self._pois = after
         return results
@@ -113,30 +119,30 @@ class Registry:
         """Remove a POI; gone from disk when this returns. Returns what it was. Raises RegistryError for an unknown id."""
         return self._apply_one(Delete(poi_id))
 
-    def apply_site(self, site: Sequence[Poi]) -> list[str]:
+    def apply_site(self, site: Sequence[Poi], now_ns: int = 0) -> list[str]:
         """Apply what changed in the site file since it was last applied; returns the ids touched.
 
         Entries that are new, changed or gone since then are put or deleted; an operator's edits to the others persist, also the
-        deletion of an entry that the site file still has. Raises RegistryError.
+        deletion of an entry that the site file still has. `now_ns` is when. Raises RegistryError.
         """
         # A site's own kind of Poi equals no stored one: compare plain ones.
-        wanted = {poi.poi_id: Poi.model_validate(poi.model_dump()) for poi in site}
+        wanted = {poi.poi_id: Poi.model_validate(poi.model_dump() | UNEDITED) for poi in site}
         applied = self._baseline()
         changed = [poi_id for poi_id, poi in wanted.items() if applied.get(poi_id) != poi]
         gone = [poi_id for poi_id in applied if poi_id not in wanted]
         after = (set(self._pois) | set(changed)) - set(gone)
-        if len(after) > MAX_POIS:
-            raise RegistryError(f"registry {self.path}: with the site's POIs it would hold {len(after)}, at most {MAX_POIS}")
+        if len(after) > MAX_REGISTERED:
+            would = f"with the site's POIs it would hold {len(after)}, at most {MAX_REGISTERED}"
+            raise RegistryError(f"registry {self.path}: {would}")
+        stored = {i: wanted[i].model_copy(update={"edited_by": BY_SITE, "edited_ns": now_ns}) for i in changed}
         statements: list[Statement] = []
         for poi_id in changed:
-            content = wanted[poi_id].model_dump_json()
-            statements += [
-                (f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (poi_id, content)) for table in ("pois", "baseline")
-            ]
+            for table, poi in (("pois", stored[poi_id]), ("baseline", wanted[poi_id])):
+                statements.append((f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (poi_id, poi.model_dump_json())))
         for poi_id in gone:
             statements += [(f"DELETE FROM {table} WHERE poi_id = ?", (poi_id,)) for table in ("pois", "baseline")]
         self._commit(statements)
-        self._pois.update({poi_id: wanted[poi_id] for poi_id in changed})
+        self._pois.update(stored)
         for poi_id in gone:
             self._pois.pop(poi_id, None)
         return sorted(changed + gone)
@@ -219,8 +225,8 @@ def default_path(robot: str, site: Path) -> Path:
 
 
 def _put(pois: dict[str, Poi], poi: Poi) -> tuple[Poi, Statement]:
-    if poi.poi_id not in pois and len(pois) >= MAX_POIS:
-        raise RegistryError(f"poi_id: the registry is full, it holds {MAX_POIS} POIs")
+    if poi.poi_id not in pois and len(pois) >= MAX_REGISTERED:
+        raise RegistryError(f"poi_id: the registry is full, it holds {MAX_REGISTERED} POIs")
     pois[poi.poi_id] = poi
     return poi, ("INSERT OR REPLACE INTO pois VALUES (?, ?)", (poi.poi_id, poi.model_dump_json()))
 

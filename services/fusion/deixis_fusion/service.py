@@ -52,7 +52,7 @@ class FusionService:
         node.serve_get(topics.POI, self._answer_poi, id="**")
         node.serve_get(topics.STATE, self._answer_state)
         self._place_robot()
-        self._fusion.set_pois(registry.pois())
+        self._pois_changed = True
 
     def wait_s(self) -> float:
         """How long nothing needs to be done without input."""
@@ -94,7 +94,8 @@ class FusionService:
         self._node.note("edits_lost", f"{lost} POI edits lost: they came faster than they could be kept" if lost else None)
 
     def _after_edits(self) -> None:
-        self._fusion.set_pois(self._registry.pois())
+        # Taken over with the next frame: thousands of edits may come before it.
+        self._pois_changed = True
         rejected = self._edits.rejected
         self._count_to("edits_rejected", rejected)
         last = self._edits.rejections[-1] if self._edits.rejections else None
@@ -152,6 +153,9 @@ class FusionService:
         return None if self._node.lockstep else self._node.now_ns()
 
     def _answer_frame(self, frame: JoinedFrame, now_s: float) -> None:
+        if self._pois_changed:
+            self._fusion.set_pois(self._registry.pois())
+            self._pois_changed = False
         with self._node.step():
             statuses = {stage: self._monitor.status(stage, missed=True) for stage in frame.missing}
             belief, targets = self._fusion.answer(frame, statuses, self._now_ns())
@@ -254,7 +258,7 @@ def open_registry(node: Node, config: FusionConfig) -> Registry:
     registry = Registry(path)
     if node.site is not None:
         try:
-            touched = registry.apply_site(node.site.pois)
+            touched = registry.apply_site(node.site.pois, node.now_ns())
         except RegistryError:
             registry.close()
             raise
