@@ -7,6 +7,7 @@ import os
 import re
 import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,10 @@ CREATE TABLE baseline (poi_id TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT R
 
 class RegistryError(Exception):
     """The file cannot be used, or an edit cannot be done; the text names the file or the field."""
+
+
+class CorruptError(RegistryError):
+    """What the file holds is damaged."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,7 @@ class Registry:
         """Open the file, or make it with its folder; without a path, in memory. Raises RegistryError where that fails."""
         self.path = path or MEMORY
         self._pois: dict[str, Poi] = {}
+        self._copied = False
         try:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +76,8 @@ class Registry:
             self._pois = self._load()
         except sqlite3.Error as error:
             self._db.close()
-            raise RegistryError(f"registry {self.path}: {_cause(error)}") from None
+            kind = CorruptError if _is_damage(error) else RegistryError
+            raise kind(f"registry {self.path}: {_cause(error)}") from None
         except RegistryError:
             self._db.close()
             raise
@@ -147,6 +154,26 @@ class Registry:
             self._pois.pop(poi_id, None)
         return sorted(changed + gone)
 
+    def keep_copy(self) -> None:
+        """Copy the file, found sound, beside itself where it has changed since the last copy. Raises RegistryError."""
+        if self._copied or not isinstance(self.path, Path):
+            return
+        good = copy_of(self.path)
+        fresh = good.with_name(good.name + ".fresh")
+        try:
+            fresh.unlink(missing_ok=True)
+            with closing(sqlite3.connect(fresh, isolation_level=None)) as copy:
+                self._db.backup(copy)
+                (verdict,) = copy.execute("PRAGMA quick_check(1)").fetchone()
+            if verdict != "ok":
+                raise CorruptError(f"registry {self.path}: no copy kept, it has become corrupt: {verdict}")
+            with fresh.open("rb") as written:
+                os.fsync(written.fileno())
+            fresh.replace(good)
+        except (OSError, sqlite3.Error) as error:
+            raise RegistryError(f"registry {self.path}: no copy kept: {error}") from None
+        self._copied = True
+
     def close(self) -> None:
         """Close the file."""
         self._db.close()
@@ -178,7 +205,7 @@ class Registry:
     def _load(self) -> dict[str, Poi]:
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
-            raise RegistryError(f"registry {self.path}: is corrupt: {verdict}")
+            raise CorruptError(f"registry {self.path}: is corrupt: {verdict}")
         return self._read("SELECT poi_id, content FROM pois")
 
     def _baseline(self) -> dict[str, Poi]:
@@ -193,7 +220,7 @@ class Registry:
             try:
                 pois[poi_id] = decode_json(Poi, content)
             except (CodecError, TypeError) as error:
-                raise RegistryError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
+                raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
         return pois
 
     def _commit(self, statements: Sequence[Statement]) -> None:
@@ -203,6 +230,7 @@ class Registry:
             for statement, values in statements:
                 self._db.execute(statement, values)
             self._db.execute("COMMIT")
+            self._copied = False
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
@@ -241,6 +269,15 @@ def _cause(error: sqlite3.Error) -> str:
     text = str(error)
     if "locked" in text or "busy" in text:
         return "is locked by another process; is another fusion stage running on it?"
-    if "not a database" in text or "malformed" in text:
+    if _is_damage(error):
         return f"is corrupt: {text}"
     return text
+
+
+def _is_damage(error: sqlite3.Error) -> bool:
+    return any(word in str(error) for word in ("not a database", "malformed"))
+
+
+def copy_of(path: Path) -> Path:
+    """Where the last good copy of a registry is."""
+    return path.with_name(path.name + ".good")

@@ -17,6 +17,7 @@ from .joining import STAGES, FrameJoiner, JoinedFrame
 from .localisation import RobotPlace
 from .poi_edits import PoiEdits
 from .registry import Registry, RegistryError, default_path
+from .registry_recovery import open_registry_file
 from .sources import Reading, SourceEnd, SourceMonitor
 from .state import Asked, Standing, state_of
 
@@ -24,6 +25,7 @@ DEPTH = 32
 IDLE_S = 0.25
 # Stages start one after the other; until then a silent one is no fault.
 START_S = 5.0
+COPY_EVERY_S = 60.0
 
 
 class FusionService:
@@ -53,6 +55,7 @@ class FusionService:
         node.serve_get(topics.STATE, self._answer_state)
         self._place_robot()
         self._pois_changed = True
+        self._copy_due_s = 0.0
 
     def wait_s(self) -> float:
         """How long nothing needs to be done without input."""
@@ -71,7 +74,19 @@ class FusionService:
         camera_waits = self._node.lockstep and topics.FRAME.stage in self._node.alive_stages()
         if self._end.is_over(now_s, camera_waits):
             self._publish(self._fusion.end(self._now_ns()))
+        if now_s >= self._copy_due_s:
+            self._copy_due_s = now_s + COPY_EVERY_S
+            self.keep_copy()
         self._report_sources(now_s)
+
+    def keep_copy(self) -> None:
+        """Keep a copy of the registry, where it has changed: for the day that the file is damaged."""
+        try:
+            self._registry.keep_copy()
+        except RegistryError as error:
+            self._node.note("registry copy", str(error))
+        else:
+            self._node.note("registry copy", None)
 
     # --- inputs -------------------------------------------------------------------------------------------------------
 
@@ -239,6 +254,7 @@ def serve(node: Node, config: FusionConfig) -> None:
         service = FusionService(node, config, registry)
         while node.wait(service.wait_s()):
             service.step()
+        service.keep_copy()
     finally:
         registry.close()
 
@@ -255,7 +271,10 @@ def open_registry(node: Node, config: FusionConfig) -> Registry:
         path = default_path(node.robot, node.site.path)
     else:
         node.note("registry", "no site and no registry file: the POIs last as long as this process")
-    registry = Registry(path)
+    registry, recovered = open_registry_file(path) if path is not None else (Registry(None), "")
+    if recovered:
+        node.warn("registry", recovered)
+        node.note("registry", recovered)
     if node.site is not None:
         try:
             touched = registry.apply_site(node.site.pois, node.now_ns())
