@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,8 @@ MAX_SITE_BYTES = 4 << 20
 # The same by libyaml where PyYAML was built with it: 10 000 POIs in a second instead of ten.
 LOADER: type[yaml.SafeLoader | yaml.CSafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 WallEnd = tuple[Metre, Metre]
+WallLine = tuple[WallEnd, WallEnd]
+Wall = Annotated[tuple[WallEnd, ...], Field(min_length=2, max_length=1024)]
 
 
 class SiteError(ValueError):
@@ -47,11 +50,24 @@ class Site(BaseModel):
     pois: list[SitePoi] = Field(
         default_factory=list, max_length=MAX_REGISTERED, description="Points of interest in the map frame."
     )
-    walls: list[tuple[WallEnd, WallEnd]] = Field(
-        default_factory=list, max_length=4096, description="Walls as [[x, y], [x, y]] in the map frame, metres; they hide POIs."
+    walls: list[Wall] = Field(
+        default_factory=list,
+        max_length=4096,
+        description="Walls, which hide POIs, in the map frame, metres: lines [[x, y], [x, y]], or polygons of 3 corners and more.",
+    )
+    map: Annotated[str, Field(max_length=4096)] = Field(
+        default="", description="A ROS map_server YAML beside this file: what is occupied in it are walls, too."
     )
     settings: dict[str, dict[str, Any]] = Field(default_factory=dict, description="Settings of the other stages, by stage.")
     path: Path = Field(default=Path(), exclude=True, description="The file itself; filled in on loading.")
+
+    @property
+    def wall_lines(self) -> list[WallLine]:
+        """The walls that stand in this file as lines, polygons as their sides. Those of `map`: see `occupancy_map`."""
+        lines: list[WallLine] = []
+        for wall in self.walls:
+            lines += pairwise(wall if len(wall) == 2 else (*wall, wall[0]))
+        return lines
 
     @model_validator(mode="after")
     def _ids_are_unique(self) -> Site:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from deixis_runtime.occupancy_map import wall_lines
 from deixis_runtime.queries import Query
 from deixis_runtime.settings import ConfigError
+from deixis_runtime.site import SiteError
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
 from deixis_schemas.messages import MAX_TEXT, CameraInfo, FrameId, Message, Poi, SourceState, Target
@@ -140,7 +142,7 @@ class FusionService:
         site = self._node.site
         if site is None:
             return
-        self._fusion.set_walls(site.walls)
+        self._fusion.set_walls(wall_lines(site))
         pose = site.robot_pose
         self._fusion.start_robot_at(RobotPlace(pose.x_m, pose.y_m, pose.yaw_deg))
 
@@ -245,18 +247,25 @@ class FusionService:
 
 
 def serve(node: Node, config: FusionConfig) -> None:
-    """Run the stage until told to stop. Raises ConfigError where the registry cannot be used."""
+    """Run the stage until told to stop. Raises ConfigError where registry or map cannot be used."""
     try:
         registry = open_registry(node, config)
     except RegistryError as error:
         raise ConfigError(str(error)) from None
     try:
-        service = FusionService(node, config, registry)
+        service = _service(node, config, registry)
         while node.wait(service.wait_s()):
             service.step()
         service.keep_copy()
     finally:
         registry.close()
+
+
+def _service(node: Node, config: FusionConfig, registry: Registry) -> FusionService:
+    try:
+        return FusionService(node, config, registry)
+    except SiteError as error:
+        raise ConfigError(str(error)) from None
 
 
 def open_registry(node: Node, config: FusionConfig) -> Registry:

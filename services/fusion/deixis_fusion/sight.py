@@ -132,7 +132,7 @@ class Lookout:
         eye = (place.position_m[0], place.position_m[1])
         same = self._kept is not None and self._kept[0] is points and self._kept[1] is walls
         if not same or math.dist(eye, self._eye) > HELD_M:
-            hidden = walls.hide(eye, points.xy, self._clearance_m)
+            hidden = walls.hide(eye, points.xy, self._clearance_m, points.extent / 2 + self._clearance_m)
             self._hidden, self._index = np.flatnonzero(hidden), np.flatnonzero(~hidden)
             self._kept, self._eye = (points, walls), eye
         return Sight(bearings_from(place, points, self._index), points, self._index)
