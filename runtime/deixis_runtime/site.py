@@ -53,7 +53,7 @@ class Site(BaseModel):
     walls: list[Wall] = Field(
         default_factory=list,
         max_length=4096,
-        description="Walls, which hide POIs, in the map frame, metres: lines [[x, y], [x, y]], or polygons of 3 corners and more.",
+        description="Walls, which hide POIs: lines [[x, y], [x, y]], or polygons of 3 corners and more; map frame, metres.",
     )
     map: Annotated[str, Field(max_length=4096)] = Field(
         default="", description="A ROS map_server YAML beside this file: what is occupied in it are walls, too."
