@@ -26,10 +26,11 @@ POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible
 # What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
 # `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
 _OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored")
-_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg")
+_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
 _OF_PLACE = ("axis_deg", "x_m", "y_m")
 ROW = {name: i for i, name in enumerate((*_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
 SIDES: tuple[Side, ...] = ("left", "right")
+VARIANCE_OF_PITCH = 3  # in `HeadPose.covariance_deg2`
 STATUSES = ("tracking", "out_of_range")
 
 
@@ -76,7 +77,10 @@ class Sample:
         if told is None:
             return (NAN,) * len(_OF_HEAD)
         status, side = _place_in(STATUSES, told.status), _place_in(SIDES, told.side)
-        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg)
+        pitch = (NAN, NAN)
+        if told.pitch_deg is not None and told.covariance_deg2 is not None:
+            pitch = told.pitch_deg, math.sqrt(told.covariance_deg2[VARIANCE_OF_PITCH])
+        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg), *pitch
 
     def _of_place(self) -> tuple[float, ...]:
         if self.place is None:
@@ -147,7 +151,8 @@ class HandObservation:
 class HeadObservation:
     """A tracked head: its yaw, or (`yaw_deg` none) that it is turned beyond the range, to `side` where that is known.
 
-    `beyond_deg` is that range, where the stage tells it.
+    `beyond_deg` is that range, where the stage tells it. `pitch_deg` is up, from the line to the camera; it is only there with
+    a sigma that the stage states.
     """
 
     yaw_deg: float | None
@@ -155,6 +160,8 @@ class HeadObservation:
     side: Side | None = None
     agreement: float = 1.0
     beyond_deg: float | None = None
+    pitch_deg: float | None = None
+    pitch_sigma_deg: float | None = None
 
 
 class View(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from deixis_schemas.messages import HeadPose
@@ -40,7 +41,20 @@ def head_over(frames: Frames, axis_deg: float | None = None) -> HeadObservation 
     weights = frames.weights[tracked]
     yaw, spread = median_angle((frames.column("yaw_deg") + frames.turns_to(axis_deg))[tracked], weights)
     stated = median(frames.column("yaw_sigma_deg")[tracked], weights)
-    return HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+    seen = HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+    return _with_pitch(seen, frames, tracked)
+
+
+def _with_pitch(seen: HeadObservation, frames: Frames, tracked: Flags) -> HeadObservation:
+    """The same with the pitch, where it was told with its sigma in most frames."""
+    pitches = frames.column("pitch_deg")
+    told = tracked & ~np.isnan(pitches)
+    weights = frames.weights[told]
+    if not told.any() or weights.sum() < frames.weights[tracked].sum() / 2:
+        return seen
+    pitch, spread = median_angle(pitches[told], weights)
+    stated = median(frames.column("pitch_sigma_deg")[told], weights)
+    return replace(seen, pitch_deg=pitch, pitch_sigma_deg=math.hypot(stated, spread))
 
 
 def _out_of_range(frames: Frames, beyond: Flags, share: float) -> HeadObservation:

@@ -39,17 +39,22 @@ HELD_M = 0.02
 
 
 class Points(NamedTuple):
-    """POIs as arrays: positions in the map (n, 2) and sizes across (n), metres."""
+    """POIs as arrays: positions in the map (n, 2), with height (n, 3), and sizes across (n), metres."""
 
     pois: Sequence[Poi]
-    xy: Values
+    xyz: Values
     extent: Values
+
+    @property
+    def xy(self) -> Values:
+        """Positions seen from above."""
+        return self.xyz[:, :2]
 
     @staticmethod
     def of(pois: Sequence[Poi]) -> Points:
         """The POIs in their order."""
-        xy = np.array([poi.position_m[:2] for poi in pois], dtype=np.float64).reshape(-1, 2)
-        return Points(pois, xy, np.array([poi.extent_m for poi in pois], dtype=np.float64))
+        xyz = np.array([poi.position_m for poi in pois], dtype=np.float64).reshape(-1, 3)
+        return Points(pois, xyz, np.array([poi.extent_m for poi in pois], dtype=np.float64))
 
 
 class Bearings(NamedTuple):
@@ -62,11 +67,15 @@ class Bearings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sight(Sequence[Candidate]):
-    """The POIs in question and their bearings. `points` and `chosen` (which of them are in sight) allow for other places."""
+    """The POIs in question and their bearings. `points` and `chosen` (which of them are in sight) allow for other places.
+
+    `place` is where they are seen from; none where bearings alone are known.
+    """
 
     bearings: Bearings
     points: Points
     chosen: Indices
+    place: PersonPlace | None = None
 
     @staticmethod
     def of(candidates: Sequence[Candidate]) -> Sight:
@@ -77,7 +86,7 @@ class Sight(Sequence[Candidate]):
         sigma = np.array([candidate.bearing_sigma_deg for candidate in candidates], dtype=np.float64)
         cases = likeliest + DISTANCE_ERRORS[:, None] * sigma
         bearings = Bearings(likeliest, sigma, cases.astype(np.float32))
-        points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 2)), np.zeros(len(sigma)))
+        points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 3)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
     def cases_from(self, places: Sequence[PersonPlace], part: slice) -> Singles:
@@ -135,7 +144,7 @@ class Lookout:
             hidden = walls.hide(eye, points.xy, self._clearance_m, points.extent / 2 + self._clearance_m)
             self._hidden, self._index = np.flatnonzero(hidden), np.flatnonzero(~hidden)
             self._kept, self._eye = (points, walls), eye
-        return Sight(bearings_from(place, points, self._index), points, self._index)
+        return Sight(bearings_from(place, points, self._index), points, self._index, place)
 
 
 class _Turned(NamedTuple):

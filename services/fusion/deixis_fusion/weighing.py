@@ -14,6 +14,7 @@ import numpy.typing as npt
 from .config import HandConfig, HeadConfig
 from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
+from .height import likelihoods
 from .sight import Sight
 
 Values = npt.NDArray[np.float64]
@@ -71,14 +72,29 @@ def weigh(evidence: Evidence, seen: Sight, hand_config: HandConfig, head_config:
     hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
     best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
     floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
-    return Weighing(hand, head, joint, most / best, floor)
+    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, head_config)
+
+
+def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: HeadConfig) -> Weighing:
+    """The same with how high the head looks, where that was measured and from one place (`height.py`).
+
+    How well a POI fits is about directions: a pitch that is wrong makes no POI one that nobody can have meant.
+    """
+    if evidence.head is None or evidence.views or seen.place is None:
+        return weighed
+    xyz, extent = seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen]
+    high = likelihoods(evidence.head, seen.place, xyz, extent, config)
+    if high is None:
+        return weighed
+    floor = weighed.head_floor * float(high.min())
+    return Weighing(weighed.hand, weighed.head * high, weighed.joint * high, weighed.fit, floor)
 
 
 def _part(told: Mapping[str, Values], cases: Singles) -> Values:
     """Of a part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
-    likelihoods = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
-    joint = np.asarray(math.prod(likelihoods.values()))
-    means = [likelihoods[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
+    of_source = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
+    joint = np.asarray(math.prod(of_source.values()))
+    means = [of_source[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
     return np.array([*means, joint.mean(axis=0), joint.max(axis=0)], dtype=np.float64)
 
 
