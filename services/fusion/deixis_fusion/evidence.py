@@ -28,7 +28,7 @@ POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible
 _OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored")
 _OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
 _OF_PLACE = ("axis_deg", "x_m", "y_m")
-ROW = {name: i for i, name in enumerate((*_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
+ROW = {name: i for i, name in enumerate(("at_ns", *_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
 SIDES: tuple[Side, ...] = ("left", "right")
 VARIANCE_OF_PITCH = 3  # in `HeadPose.covariance_deg2`
 STATUSES = ("tracking", "out_of_range")
@@ -58,7 +58,7 @@ class Sample:
     @cached_property
     def row(self) -> bytes:
         """What the frame shows in numbers: `ROW`, packed."""
-        return struct.pack(f"{len(ROW)}d", *self._of_hand(), *self._of_head(), *self._of_place())
+        return struct.pack(f"{len(ROW)}d", self.at_ns, *self._of_hand(), *self._of_head(), *self._of_place())
 
     def _of_hand(self) -> tuple[float, ...]:
         told = self.gesture

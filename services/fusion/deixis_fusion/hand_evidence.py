@@ -25,14 +25,15 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
     direction to the camera in each frame.
     """
     kinds = frames.column("kind")
-    pointing = ~np.isnan(kinds)
+    pointing = frames.tells("kind")
     if not pointing.any():
         return None
     gesture, agreement = _vote(kinds[pointing], frames.weights[pointing])
     own = pointing if gesture == "invisible" else kinds == POINTING.index(gesture)
-    side = majority(frames.column("hand")[own], frames.weights[own])
+    sided = own & frames.tells("hand")
+    side = majority(frames.column("hand")[sided], frames.weights[sided])
     hand = None if side is None else SIDES[side]
-    told = own & ~np.isnan(frames.column("bearing_deg"))
+    told = own & frames.tells("bearing_deg")
     if not told.any():
         return HandObservation(gesture, agreement=agreement, hand=hand)
     weights, turns, seen = frames.weights[told], frames.turns_to(axis_deg)[told], frames.column("bearing_deg")[told]
@@ -44,7 +45,7 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
         other, spread_of_other = median_angle(180 - seen + turns, weights)
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
-    curve = _mean_curve([frames.samples[int(i)] for i in np.flatnonzero(told)], weights, turns)
+    curve = _mean_curve([frames.samples[i] for i in told.nonzero()[0].tolist()], weights, turns)
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
 
 
