@@ -26,12 +26,25 @@ Indices = npt.NDArray[np.intp]
 # With a distance known to a tenth, the bearing of a POI 0.6 m from the person goes in steps of 4 degrees, the sigma of a head;
 # that of farther ones in smaller steps.
 CASES = 15
-_SHARES = (np.arange(CASES) + 0.5) / CASES
-_QUANTILES = np.array([NormalDist().inv_cdf(share) for share in _SHARES])
-# Their middles have less variance than the distribution that they stand for.
-DISTANCE_ERRORS: Values = _QUANTILES / _QUANTILES.std()
-# Across a POI, spread so that no part of it goes with one distance (multiples of the golden ratio).
-ACROSS: Singles = ((np.arange(CASES) * (math.sqrt(5) - 1) / 2) % 1 - 0.5).astype(np.float32)
+# Enough for POIs whose bearing is known to `FEW_BELOW_DEG`: they go in steps of 3 degrees then.
+FEW_CASES = 5
+FEW_BELOW_DEG = 4.0
+
+
+def _distance_errors(count: int) -> Values:
+    """So many equally likely values of a standard normal distribution."""
+    middles = np.array([NormalDist().inv_cdf((i + 0.5) / count) for i in range(count)])
+    # Middles have less variance than the distribution that they stand for.
+    return np.asarray(middles / middles.std())
+
+
+def _across(count: int) -> Singles:
+    """So many places across a POI, spread so that no part of it goes with one distance (multiples of the golden ratio)."""
+    return ((np.arange(count) * (math.sqrt(5) - 1) / 2) % 1 - 0.5).astype(np.float32)
+
+
+DISTANCE_ERRORS = _distance_errors(CASES)
+ERRORS = {count: (_distance_errors(count), _across(count)) for count in (CASES, FEW_CASES)}
 LEAST_AWAY_M = 0.05
 WIDEST_SIGMA_DEG = 60.0
 # Sight lines are looked along anew where the person has moved by more: less than what hangs on a wall stands off it.
@@ -89,11 +102,13 @@ class Sight(Sequence[Candidate]):
         points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 3)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
-    def cases_from(self, places: Sequence[PersonPlace], part: slice) -> Singles:
-        """Bearings of a part of these POIs in all cases (v, CASES, n): from these v places, or from where they are seen now."""
+    def cases_from(self, places: Sequence[PersonPlace], part: Indices, count: int = CASES) -> Singles:
+        """Bearings of a part of these POIs in all cases (v, CASES, n): from where they are seen now or, in `count` cases, from
+        these v places.
+        """
         if not places:
             return self.bearings.cases[None, :, part]
-        return _cases(places, _Turned.of(places, self.points, self.chosen[part]))
+        return _cases(places, _Turned.of(places, self.points, self.chosen[part]), count)
 
     def poi(self, i: int) -> Poi:
         """The i-th POI in sight."""
@@ -183,22 +198,23 @@ def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearing
     likeliest = np.degrees(np.arctan2(left, turned.ahead[0] + turned.distance[0]))
     across = np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12))
     sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, away)))
-    return Bearings(likeliest, sigma, _cases([place], turned)[0])
+    return Bearings(likeliest, sigma, _cases([place], turned, CASES)[0])
 
 
-def _cases(places: Sequence[PersonPlace], turned: _Turned) -> Singles:
-    """Bearings from v places in all cases (v, CASES, n).
+def _cases(places: Sequence[PersonPlace], turned: _Turned, count: int) -> Singles:
+    """Bearings from v places in so many cases, as `ERRORS` has them: (v, count, n).
 
     In each the person stands on the line through camera and head, which the picture tells well; how far along it, is known to
     `place.sigma_m`.
     In single precision, a hundred thousandth of a degree: half as many bytes, of the most there is to reckon.
     """
+    errors, across = ERRORS[count]
     relative = np.array([place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0 for place in places])
-    steps = (turned.distance * np.exp(relative[:, None] * DISTANCE_ERRORS)).astype(np.float32)
+    steps = (turned.distance * np.exp(relative[:, None] * errors)).astype(np.float32)
     # The angle of a part of the POI, for small angles; a POI that one stands in lies anywhere.
     wide = np.degrees(np.minimum(turned.extent / turned.away, math.pi / 2)).astype(np.float32)
     bearings = turned.ahead.astype(np.float32)[:, None, :] + steps[:, :, None]
     np.arctan2(turned.left.astype(np.float32)[:, None, :], bearings, out=bearings)
     bearings *= np.float32(math.degrees(1))
-    bearings += ACROSS[:, None] * wide[:, None, :]
+    bearings += across[:, None] * wide[:, None, :]
     return bearings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -15,13 +15,15 @@ from .config import HandConfig, HeadConfig
 from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
 from .height import likelihoods
-from .sight import Sight
+from .localisation import PersonPlace
+from .sight import CASES, FEW_BELOW_DEG, FEW_CASES, Indices, Sight
 
 Values = npt.NDArray[np.float64]
 
 NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 4096
+MANY = 500
 
 
 class Weighing(NamedTuple):
@@ -67,12 +69,29 @@ def weigh(evidence: Evidence, seen: Sight, hand_config: HandConfig, head_config:
         even = np.ones(len(seen))
         return Weighing(even, even, even, even)
     places = [view.place for view in views if view.place is not None]
-    at_a_time = max(1, AT_A_TIME // len(views))
-    parts = [_part(told, seen.cases_from(places, slice(start, start + at_a_time))) for start in range(0, len(seen), at_a_time)]
-    hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
+    found = np.empty((4, len(seen)))
+    for part, count in _parts(seen, places):
+        found[:, part] = _part(told, seen.cases_from(places, part, count))
+    hand, head, joint, most = found
     best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
     floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
     return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, head_config)
+
+
+def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices, int]]:
+    """POIs that are weighed together, and in how many cases.
+
+    Of a walk past very many those whose bearing is well known are weighed in few cases: each is weighed from every place.
+    """
+    everybody = np.arange(len(seen))
+    well_known = seen.bearings.sigma < FEW_BELOW_DEG
+    groups = [(everybody, CASES)]
+    if places and len(seen) > MANY:
+        groups = [(everybody[~well_known], CASES), (everybody[well_known], FEW_CASES)]
+    for which, count in groups:
+        at_a_time = max(1, AT_A_TIME * CASES // (count * max(1, len(places))))
+        for start in range(0, len(which), at_a_time):
+            yield which[start : start + at_a_time], count
 
 
 def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: HeadConfig) -> Weighing:
