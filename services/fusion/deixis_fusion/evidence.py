@@ -17,7 +17,6 @@ from .localisation import PersonPlace, wrapped_deg
 
 Values = npt.NDArray[np.float64]
 PointingGesture = Literal["point_left", "invisible", "point_right"]
-StageStatus = tuple[SourceStatus, str]
 
 NAN = math.nan
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
@@ -25,7 +24,7 @@ POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible
 
 # What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
 # `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
-_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored")
+_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored", "has_curve")
 _OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
 _OF_PLACE = ("axis_deg", "x_m", "y_m")
 ROW = {name: i for i, name in enumerate(("at_ns", *_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
@@ -64,13 +63,9 @@ class Sample:
         told = self.gesture
         if told is None:
             return (NAN,) * len(_OF_HAND)
-        mirrored = float(told.bearing_mirrored)
-        return (
-            _place_in(POINTING, self.pointing),
-            _place_in(SIDES, told.hand),
-            *_known(told.bearing_deg, told.bearing_sigma_deg),
-            mirrored,
-        )
+        kind, side = _place_in(POINTING, self.pointing), _place_in(SIDES, told.hand)
+        bearing = _known(told.bearing_deg, told.bearing_sigma_deg)
+        return kind, side, *bearing, float(told.bearing_mirrored), 1.0 if told.bearing_likelihood else NAN
 
     def _of_head(self) -> tuple[float, ...]:
         told = self.pose

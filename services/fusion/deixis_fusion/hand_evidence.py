@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
-from .evidence import POINTING, SIDES, HandObservation, PointingGesture, Sample
-from .frames import Frames, Values
+from .evidence import POINTING, SIDES, HandObservation, PointingGesture
+from .frames import Flags, Frames, Values
 from .robust import majority, median, median_angle
 
 # A finger seen in this part of the frames is seen: at VGA it comes and goes with the outline.
@@ -45,17 +44,16 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
         other, spread_of_other = median_angle(180 - seen + turns, weights)
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
-    curve = _mean_curve([frames.samples[i] for i in told.nonzero()[0].tolist()], weights, turns)
+    curve = _mean_curve(frames, told & frames.tells("has_curve"), axis_deg)
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
 
 
-def _mean_curve(samples: Sequence[Sample], weights: Values, turns_deg: Values) -> tuple[float, ...]:
-    """Of the frames together: their mean, for they show nearly the same, and where they differ either may be right."""
-    curves = [sample.curve for sample in samples if sample.curve is not None]
+def _mean_curve(frames: Frames, told: Flags, axis_deg: float | None) -> tuple[float, ...]:
+    """Of these frames together: their mean, for they show nearly the same, and where they differ either may be right."""
+    curves = [frames.samples[i].curve for i in told.nonzero()[0].tolist()]
     if not curves:
         return ()
-    with_curve = np.array([sample.curve is not None for sample in samples])
-    weights, steps = weights[with_curve], np.round(turns_deg[with_curve] / SAME_AXIS_DEG)
+    weights, steps = frames.weights[told], np.round(frames.turns_to(axis_deg)[told] / SAME_AXIS_DEG)
     stacked, total = np.array(curves), np.zeros(BEARINGS)
     for step in np.unique(steps):
         same = steps == step

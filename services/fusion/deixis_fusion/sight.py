@@ -135,6 +135,14 @@ def poi_at(seen: Sequence[Candidate], i: int) -> Poi:
     return seen.poi(i) if isinstance(seen, Sight) else seen[i].poi
 
 
+def bearings_at(seen: Sequence[Candidate], chosen: Indices) -> list[float]:
+    """The likeliest bearings of some of the POIs that are seen, degrees."""
+    if isinstance(seen, Sight):
+        bearings: list[float] = seen.bearings.likeliest[chosen].tolist()
+        return bearings
+    return [seen[i].bearing_deg for i in chosen.tolist()]
+
+
 class Lookout:
     """The POIs in sight of one person, from frame to frame. Sight lines are kept while the person stands still."""
 
