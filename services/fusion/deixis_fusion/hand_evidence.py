@@ -53,20 +53,21 @@ def _mean_curve(frames: Frames, told: Flags, axis_deg: float | None) -> tuple[fl
     curves = [frames.samples[i].curve for i in told.nonzero()[0].tolist()]
     if not curves:
         return ()
-    weights, steps = frames.weights[told], np.round(frames.turns_to(axis_deg)[told] / SAME_AXIS_DEG)
-    stacked, total = np.array(curves), np.zeros(BEARINGS)
-    for step in np.unique(steps):
-        same = steps == step
-        total += _turned(weights[same] @ stacked[same], step * SAME_AXIS_DEG)
-    return tuple((total / weights.sum()).tolist())
+    weights, turns = frames.weights[told], frames.turns_to(axis_deg)[told]
+    turned = _turned(np.array(curves), np.round(turns / SAME_AXIS_DEG) * SAME_AXIS_DEG)
+    return tuple((weights @ turned / weights.sum()).tolist())
 
 
-def _turned(curve: Values, turn_deg: float) -> Values:
-    """The curve of bearings with all of them turned."""
-    if not turn_deg:
-        return curve
-    steps = np.arange(BEARINGS) - turn_deg / BEARING_STEP_DEG
-    return np.asarray(np.interp(steps, np.arange(BEARINGS), curve, period=BEARINGS))
+def _turned(curves: Values, turns_deg: Values) -> Values:
+    """Curves of bearings (m, n) with all bearings of each turned (m), on a line between their values."""
+    if not turns_deg.any():
+        return curves
+    steps = np.arange(BEARINGS) - turns_deg[:, None] / BEARING_STEP_DEG
+    below = np.floor(steps)
+    share, place = steps - below, below.astype(np.intp)
+    rows = np.arange(len(curves))[:, None]
+    low, high = curves[rows, place % BEARINGS], curves[rows, (place + 1) % BEARINGS]
+    return np.asarray(low + share * (high - low))
 
 
 def _vote(kinds: Values, weights: Values) -> tuple[PointingGesture, float]:
