@@ -32,7 +32,7 @@ from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.visibility import Wall
 from deixis_schemas import codec
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import Belief, CameraInfo, Gestures, HeadPoses, Poi, Producer, Tracks
+from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS, Belief, CameraInfo, Gestures, HeadPoses, Poi, Producer, Tracks
 from rich.console import Console
 from rich.table import Table
 
@@ -140,13 +140,19 @@ def frame(seq: int, case: Case) -> JoinedFrame:
     box = {"centroid_px": (x_px, 240), "bbox_px": (x_px - width_px / 2, 210, width_px, 1.3 * width_px)}
     pose = {"person_id": 1, "status": "tracking", "yaw_deg": rng.normal(50, 3), "yaw_sigma_deg": 4.0, "face_width_px": width_px}
     stroke = {"phase": "stroke", "gesture": "point_left", "hand": "left", "bearing_deg": rng.normal(60, 8)}
-    stroke["bearing_sigma_deg"] = 12.0
+    stroke |= {"bearing_sigma_deg": 12.0, "bearing_likelihood": curve(rng.normal(60, 8))}
     gesture = {"person_id": 1} | (stroke if case.pointing else {"phase": "idle", "gesture": "none"})
     return JoinedFrame(
         Tracks.model_validate(about | {"stage": "tracker", "width": WIDTH, "height": HEIGHT, "tracks": [face | box]}),
         HeadPoses.model_validate(about | {"stage": "headpose", "poses": [pose]}),
         Gestures.model_validate(about | {"stage": "gesture", "gestures": [gesture]}),
     )
+
+
+def curve(peak_deg: float) -> list[float]:
+    """A likelihood of bearings as the gesture stage tells it."""
+    off = (np.arange(BEARINGS) * BEARING_STEP_DEG - 180 - peak_deg + 180) % 360 - 180
+    return [float(value) for value in np.exp(-0.5 * (off / 20) ** 2)]
 
 
 def broken(figures: dict[str, float]) -> list[str]:

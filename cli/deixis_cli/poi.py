@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import getpass
 import json
+import re
+import socket
 import time
+from collections.abc import Iterator, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import zenoh
+from deixis_runtime.poi_files import load_pois
 from deixis_runtime.session import open_client
 from deixis_runtime.settings import checked_name
-from deixis_runtime.site import SiteError, load_pois
+from deixis_runtime.site import SiteError
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Poi
 
@@ -20,6 +26,9 @@ from .options import CommandError, add_connect, add_json, add_robot
 
 DEADLINE_S = 5.0
 PAUSE_S = 0.1
+MAX_BY = 128
+# What msgpack needs besides a POI and its id.
+PACKED_EXTRA = 16
 
 
 def register(subparsers: Any) -> None:
@@ -32,10 +41,15 @@ def register(subparsers: Any) -> None:
     add.add_argument("--name", default="", help="for people")
     add.add_argument("--extent", type=float, default=0.5, metavar="METRES", help="size across (default: %(default)s)")
     add.add_argument("--tag", action="append", default=[], help="may be given again")
-    _place(_action(actions, "move", "give one another position", run_move))
-    _action(actions, "remove", "remove one", run_remove).add_argument("poi_id", metavar="ID", type=checked_name)
-    many = _action(actions, "import", "add or replace those of a site file, or of a YAML or JSON list", run_import)
+    move = _action(actions, "move", "give one another position", run_move)
+    _place(move)
+    remove = _action(actions, "remove", "remove one", run_remove)
+    remove.add_argument("poi_id", metavar="ID", type=checked_name)
+    what = "add or replace those of a file: a site file, a YAML or JSON list, CSV, or GeoJSON in metres of the map"
+    many = _action(actions, "import", what, run_import)
     many.add_argument("file", type=Path, metavar="FILE")
+    for edit in (add, move, remove, many):
+        edit.add_argument("--by", type=_plain, default=who(), metavar="NAME", help="who edits (default: %(default)s)")
 
 
 def run_list(given: argparse.Namespace) -> int:
@@ -80,22 +94,60 @@ def run_import(given: argparse.Namespace) -> int:
     if not pois:
         raise CommandError(f"{given.file}: holds no POIs")
     with open_client(given.connect, shared_memory=False) as session:
-        _show([_edit(session, given, poi.poi_id, Poi.model_validate(poi.model_dump())) for poi in pois], given)
+        stored: list[Poi] = []
+        for part in _parts(pois):
+            stored += _put_all(session, given, part, len(stored))
+        _show(stored, given)
     return 0
+
+
+def _parts(pois: Sequence[Poi]) -> Iterator[dict[str, Any]]:
+    """The POIs by id, as many at a time as one edit may hold."""
+    part: dict[str, Any] = {}
+    size = 0
+    for poi in pois:
+        content = poi.model_dump()
+        packed = len(codec.encode(poi)) + len(poi.poi_id) + PACKED_EXTRA
+        if part and size + packed > topics.POI.max_bytes:
+            yield part
+            part, size = {}, 0
+        part[poi.poi_id] = content
+        size += packed
+    yield part
+
+
+def _put_all(session: zenoh.Session, given: argparse.Namespace, pois: dict[str, Any], done: int) -> list[Poi]:
+    """Put POIs as one edit, of which all are stored or none; `done` of the file are. Raises CommandError."""
+    selector = f"{topics.POI.key(given.robot, id='*')}?op=put_all;by={given.by}"
+    payload = codec.pack(pois)
+    stored, refused = _answered(session, given, selector, payload)
+    if refused:
+        before = f"{done} POIs are stored, none after them: " if done else ""
+        raise CommandError(f"{before}{refused}")
+    return stored
 
 
 def _edit(session: zenoh.Session, given: argparse.Namespace, which: str, poi: Poi | None) -> Poi:
     """Put a POI, or delete it where `poi` is none, and wait for the stored one. Raises CommandError."""
-    selector = f"{topics.POI.key(given.robot, id=which)}?op={'delete' if poi is None else 'put'}"
-    payload = codec.encode(poi) if poi is not None else None
-    encoding = codec.encoding_of(Poi) if poi is not None else None
+    selector = f"{topics.POI.key(given.robot, id=which)}?op={'delete' if poi is None else 'put'};by={given.by}"
+    stored, refused = _answered(session, given, selector, codec.encode(poi) if poi is not None else None)
+    if refused:
+        raise CommandError(f"{which}: {refused}")
+    return stored[0]
+
+
+def _answered(
+    session: zenoh.Session, given: argparse.Namespace, selector: str, payload: bytes | None
+) -> tuple[list[Poi], str | None]:
+    """What an edit stored, or why it is refused. Raises CommandError where fusion does not answer."""
+    encoding = codec.encoding_of(Poi) if payload is not None else None
     deadline_s = time.monotonic() + DEADLINE_S
     while True:
-        stored, refused = get_all(session, selector, Poi, payload=payload, encoding=encoding)
+        stored, refused = get_all(session, selector, Poi, payload=payload, encoding=encoding, timeout_s=DEADLINE_S)
         if refused:
-            raise CommandError(f"{which}: {refused[0].reason}")
+            return [], refused[0].reason
         if stored:
-            return stored[0][1]
+            return [poi for _, poi in stored], None
         # A get made just as fusion comes up or restarts comes back empty.
         if time.monotonic() > deadline_s:
             raise CommandError(_nobody(given))
@@ -130,7 +182,32 @@ def _show(pois: list[Poi], given: argparse.Namespace) -> None:
     for poi in pois:
         x, y, z = poi.position_m
         tags = f"  [{', '.join(poi.tags)}]" if poi.tags else ""
-        print(f"{poi.poi_id:<16} {x:8.2f} {y:8.2f} {z:8.2f} m  {poi.extent_m:5.2f} m  {poi.name}{tags}")
+        place = f"{x:8.2f} {y:8.2f} {z:8.2f} m  {poi.extent_m:5.2f} m"
+        print(f"{poi.poi_id:<16} {place}  {_edited(poi):<40}  {poi.name}{tags}")
+
+
+def _edited(poi: Poi) -> str:
+    """When it was edited, in this host's time, and by whom."""
+    if not poi.edited_ns:
+        return poi.edited_by or "-"
+    when = datetime.fromtimestamp(poi.edited_ns / 1e9).astimezone()
+    return f"{when:%Y-%m-%d %H:%M} {poi.edited_by or 'unknown'}"
+
+
+def who() -> str:
+    """Who edits, if nothing else is said: user and host."""
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):  # a container's user without a name
+        user = "unknown"
+    return re.sub(r"[;&|=?#]", "-", f"{user}@{socket.gethostname()}")[:MAX_BY]
+
+
+def _plain(text: str) -> str:
+    """A name without what parts a selector's parameters."""
+    if not text or len(text) > MAX_BY or any(mark in text for mark in ";&|=?#"):
+        raise argparse.ArgumentTypeError(f"'{text[:80]}' is no name of up to {MAX_BY} characters without ; & | = ? #")
+    return text
 
 
 def _action(actions: Any, name: str, text: str, run: Any) -> argparse.ArgumentParser:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -142,6 +142,16 @@ class EditQueue:
             bounds = f"{MAX_EDITS} edits or {MAX_EDIT_BYTES} bytes"
             self._report("edits lost", f"{self.lost} edits lost so far: more than {bounds} waited at once")
         return [_edit_of(sample) for sample in samples]
+
+
+def check_names(parameters: Mapping[str, str], known: Sequence[str]) -> None:
+    """Refuse a selector's parameter that is not known: misspelt, it would be answered as if it were not there.
+
+    Every get knows `format`; names that begin with `_` are Zenoh's own. Raises Refused with the parameter's name.
+    """
+    for name in parameters:
+        if name not in known and name != "format" and not name.startswith("_"):
+            raise Refused(f"{name[:40]}: unknown parameter; there are {', '.join((*known, 'format'))}")
 
 
 def key_matches(expression: str, key: str) -> bool:

@@ -13,6 +13,8 @@ from .messages import TYPES, Message
 MSGPACK = "application/msgpack"
 JSON = "application/json"
 MAX_JSON_BYTES = 1 << 20
+MAX_LAID_OUT_BYTES = 256 << 10
+LINE = 160
 
 T = TypeVar("T", bound=Message)
 
@@ -40,7 +42,12 @@ def encoding_of(type_: type[Message]) -> str:
 
 def encode(message: Message) -> bytes:
     """The message as a msgpack map."""
-    return bytes(msgpack.packb(message.model_dump(), use_bin_type=True))
+    return pack(message.model_dump())
+
+
+def pack(content: dict[str, Any]) -> bytes:
+    """Plain data as a msgpack map."""
+    return bytes(msgpack.packb(content, use_bin_type=True))
 
 
 def decode(type_: type[T], payload: bytes, encoding: str, *, max_bytes: int = 1 << 20) -> T:
@@ -85,8 +92,29 @@ def parse_json(text: bytes | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[st
 
 
 def encode_json(message: Message) -> bytes:
-    """The message as JSON; binary fields in base64."""
-    return message.model_dump_json().encode()
+    """The message as JSON for people and generic clients: binary fields in base64, numbers to six digits after the point.
+
+    What fits a line of a terminal is one line, and the rest is indented; a long message, which nobody reads through, is not.
+    """
+    plain = message.model_dump_json()
+    if len(plain) > MAX_LAID_OUT_BYTES:
+        return plain.encode()
+    return _laid_out(json.loads(plain)).encode()
+
+
+def _laid_out(value: Any) -> str:
+    if isinstance(value, float):
+        return repr(float(f"{value:.6f}" if abs(value) >= 0.1 else f"{value:.6g}"))
+    if not isinstance(value, dict | list) or not value:
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, dict):
+        marks, parts = "{}", [f"{json.dumps(name)}: {_laid_out(part)}" for name, part in value.items()]
+    else:
+        marks, parts = "[]", [_laid_out(part) for part in value]
+    if sum(len(part) + 2 for part in parts) <= LINE and not any("\n" in part for part in parts):
+        return marks[0] + ", ".join(parts) + marks[1]
+    inside = ",\n".join(parts).replace("\n", "\n  ")
+    return f"{marks[0]}\n  {inside}\n{marks[1]}"
 
 
 def validate(type_: type[T], content: dict[str, Any]) -> T:

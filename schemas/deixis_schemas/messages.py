@@ -21,6 +21,8 @@ MAX_SIDE_PX = 8192
 MAX_PERSONS = 32
 MAX_TRACKS = 96
 MAX_POIS = 1024
+MAX_REGISTERED = 10_000
+"""POIs that the registry holds; a message lists `MAX_POIS` of them at most."""
 MAX_CONTOUR_BYTES = 65536
 MAX_LISTED = 16
 MAX_TEXT = 2000
@@ -355,6 +357,8 @@ class Poi(Message):
     position_m: Position = Field(description="Centre in the map frame, x, y, z, metres.")
     extent_m: float = Field(default=0.5, ge=0, le=1000, description="Size across, metres.")
     tags: list[Annotated[str, Field(max_length=64)]] = Field(default_factory=list, max_length=32)
+    edited_by: Annotated[str, Field(max_length=128)] = Field(default="", description="Who put it there, where that was told.")
+    edited_ns: Nanoseconds = Field(default=0, description="When, by the registry's clock, which fills it in; 0 where unknown.")
 
 
 class PoiBelief(Part):
@@ -392,9 +396,20 @@ class Evidence(Part):
     masses: list[FocalSet] = Field(default_factory=list, max_length=MAX_LISTED, description="The sets of largest mass.")
 
 
+class Excluded(Part):
+    """A POI that does not come into question for a person."""
+
+    poi_id: Name
+    reason: Text = Field(description="Why, e.g. 'behind a wall'.")
+
+
 CREDIBLE = (
     "The fewest POIs, the likeliest first, among which the one meant is with a probability of 0.9 (setting `answer.credible`); "
     "the first of them."
+)
+EXCLUDED = (
+    "POIs of the registry that do not come into question, and why: the first of them, the nearest to the person first. State "
+    "and Target have them, a Belief leaves them out."
 )
 CONTOUR_CONFLICT = (
     "1 - max over POIs of the product of hand's and head's likelihoods, each divided by its largest: 0 where both fit one POI, "
@@ -417,6 +432,8 @@ class PersonBelief(Part):
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
     credible_total: Count = Field(default=0, description="How many they are.")
+    excluded: list[Excluded] = Field(default_factory=list, max_length=MAX_LISTED, description=EXCLUDED)
+    excluded_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
 
@@ -441,6 +458,8 @@ class Target(OfFrame):
     contour_conflict: Share = Field(default=0.0, description=CONTOUR_CONFLICT)
     credible: list[Name] = Field(default_factory=list, max_length=MAX_LISTED, description=CREDIBLE)
     credible_total: Count = Field(default=0, description="How many they are.")
+    excluded: list[Excluded] = Field(default_factory=list, max_length=MAX_LISTED, description=EXCLUDED)
+    excluded_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
     reason: Text
     started_ns: Nanoseconds

@@ -37,6 +37,7 @@ _POIS = [
     m.PoiBelief(poi_id="vase", mass=0.9, belief=0.9, plausibility=1.0, pignistic=0.95, probability=0.97, bearing_deg=61.5),
     m.PoiBelief(poi_id="door", mass=0.0, belief=0.0, plausibility=0.1, pignistic=0.05, probability=0.03, bearing_deg=-170.0),
 ]
+_EXCLUDED = [m.Excluded(poi_id="clock", reason="behind a wall")]
 _TARGET = m.Target.derive(
     FRAME,
     m.Producer("fusion", "edge-4"),
@@ -49,6 +50,8 @@ _TARGET = m.Target.derive(
     conflict=0.0,
     credible=["vase"],
     credible_total=1,
+    excluded=_EXCLUDED,
+    excluded_total=1,
     evidence=_EVIDENCE,
     reason="points to the left; only the vase lies there",
     started_ns=STAMP_NS - 1_500_000_000,
@@ -65,10 +68,20 @@ _PERSON = m.PersonBelief(
     conflict=0.0,
     credible=["vase"],
     credible_total=1,
+    excluded=_EXCLUDED,
+    excluded_total=1,
     evidence=_EVIDENCE,
     episode_id="edge-4-1",
 )
-_POI = m.Poi(poi_id="vase", name="the blue vase", position_m=(3.4, 1.67, 1.26), extent_m=0.3, tags=["ceramics"])
+_POI = m.Poi(
+    poi_id="vase",
+    name="the blue vase",
+    position_m=(3.4, 1.67, 1.26),
+    extent_m=0.3,
+    tags=["ceramics"],
+    edited_by="anna@desk",
+    edited_ns=STAMP_NS,
+)
 _ROBOT_POSE = m.RobotPose(stamp_ns=STAMP_NS, stage="robot", instance="base-1", x_m=1.0, y_m=-2.0, yaw_deg=90.0)
 
 SAMPLES: tuple[m.Message, ...] = (

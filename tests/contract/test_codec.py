@@ -150,3 +150,23 @@ def test_too_many_bytes_are_refused_before_they_are_read():
 def test_derived_messages_cannot_forget_frame_and_producer():
     derived = m.Gestures.derive(FRAME, m.Producer("gesture", "g-1"), seq=99, stage="else")
     assert (derived.frame_id, derived.stage, derived.instance) == (FRAME.frame_id, "gesture", "g-1")
+
+
+def test_json_reads_well_in_a_terminal_and_holds_the_same():
+    state = next(sample for sample in SAMPLES if isinstance(sample, m.State))
+    lines = codec.encode_json(state).decode().splitlines()
+    assert 20 < len(lines) < 120
+    assert max(map(len, lines)) < 180
+    assert any(line.strip().startswith('{"poi_id": "vase", "mass": 0.9, "belief": 0.9') for line in lines)
+    assert codec.decode_json(m.State, "\n".join(lines)) == state
+
+
+def test_json_of_a_number_has_six_digits_after_the_point():
+    pose = m.RobotPose(stamp_ns=1, stage="robot", instance="r", x_m=0.1 + 0.2, y_m=12345.6789012, yaw_deg=1e-7)
+    assert '"x_m": 0.3, "y_m": 12345.678901, "yaw_deg": 1e-07' in codec.encode_json(pose).decode()
+
+
+def test_json_that_nobody_reads_through_is_one_line():
+    frame = next(sample for sample in SAMPLES if isinstance(sample, m.Frame))
+    large = frame.model_copy(update={"data": bytes(1 << 20)})
+    assert codec.encode_json(large).count(b"\n") == 0

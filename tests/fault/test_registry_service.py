@@ -193,6 +193,21 @@ def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(ben
     assert bench.stop() == 0
 
 
+def test_a_corrupt_registry_is_set_aside_said_so_and_its_last_good_copy_used(bench: Bench) -> None:
+    assert bench.registry is not None
+    bench.start()
+    assert bench.ask("fusion/poi/vase?by=anna", {"position_m": [1, 2, 3]}) is not None
+    assert bench.stop() == 0
+    bench.registry.write_bytes(b"damaged " * 4000)
+    bench.start()
+    assert [(poi.poi_id, poi.edited_by) for poi in bench.state().pois] == [("vase", "anna")]
+    (reply,) = bench.replies("fusion/health")
+    assert reply.ok is not None
+    notes = codec.decode(Health, reply.ok.payload.to_bytes(), str(reply.ok.encoding)).notes
+    assert any("is corrupt" in note and "pois.sqlite.corrupt-1" in note and "1 POIs of" in note for note in notes)
+    assert bench.stop() == 0
+
+
 def test_edits_are_answered_or_refused_with_the_fields_name_and_seen_in_state(bench: Bench) -> None:
     bench.start()
     stored = bench.ask("fusion/poi/vase", {"position_m": [1, 2, 3]})

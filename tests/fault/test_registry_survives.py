@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import signal
 import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from deixis_fusion.registry import Registry, RegistryError
+from deixis_fusion.registry import Put, Registry, RegistryError, copy_of
+from deixis_fusion.registry_recovery import open_registry_file
 from deixis_schemas.messages import Poi
 
 # Edits as fast as it can; says so of each once it is acknowledged.
@@ -89,22 +92,103 @@ def test_a_second_registry_on_the_same_file_is_refused_soon_and_clearly(tmp_path
 def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "pois.sqlite"
     path.write_bytes(b"this is no database, " * 100)
-    with pytest.raises(RegistryError, match=r"pois\.sqlite: is corrupt"):
-        Registry(path)
+    with pytest.raises(RegistryError, match=r"pois\.sqlite: is corrupt: .*; no good copy is beside it"):
+        open_registry_file(path)
     assert path.read_bytes().startswith(b"this is no database")
+    assert [other.name for other in tmp_path.iterdir()] == ["pois.sqlite"]
 
 
-def test_a_damaged_database_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "pois.sqlite"
+def filled(path: Path) -> None:
+    """A registry with 300 POIs of which a copy is kept, and one more."""
     registry = Registry(path)
-    for i in range(300):
-        registry.put(poi(f"p{i}"))
+    registry.apply([Put(poi(f"p{i}")) for i in range(300)])
+    registry.keep_copy()
+    registry.put(poi("later"))
     registry.close()
+
+
+def zero_all_but_the_first_page(path: Path) -> bytes:
     content = bytearray(path.read_bytes())
     content[4096:] = bytes(len(content) - 4096)
     path.write_bytes(content)
+    return bytes(content)
+
+
+def overwrite(path: Path) -> bytes:
+    path.write_bytes(b"this is no database any more, " * 100)
+    return path.read_bytes()
+
+
+def cut_off(path: Path) -> bytes:
+    path.write_bytes(path.read_bytes()[:5000])
+    return path.read_bytes()
+
+
+def break_an_entry(path: Path) -> bytes:
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("UPDATE pois SET content = '{}' WHERE poi_id = 'p7'")
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    return path.read_bytes()
+
+
+DAMAGES = [zero_all_but_the_first_page, overwrite, cut_off, break_an_entry]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_registry_is_set_aside_and_its_last_good_copy_used(tmp_path: Path, damage: Callable[[Path], bytes]) -> None:
+    path = tmp_path / "pois.sqlite"
+    filled(path)
+    damaged = damage(path)
+    registry, told = open_registry_file(path)
+    assert "is corrupt" in told
+    assert "set aside as pois.sqlite.corrupt-1, and its last good copy is used, 300 POIs of " in told
+    assert (tmp_path / "pois.sqlite.corrupt-1").read_bytes() == damaged
+    assert len(registry.pois()) == 300
+    registry.put(poi("after"))
+    registry.close()
+    again, told = open_registry_file(path)
+    assert (len(again.pois()), told) == (301, "")
+
+
+def test_what_was_set_aside_is_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    filled(path)
+    for number in (1, 2):
+        overwrite(path)
+        registry, told = open_registry_file(path)
+        assert f"pois.sqlite.corrupt-{number}," in told
+        registry.close()
+
+
+def test_a_damaged_copy_takes_no_registrys_place(tmp_path: Path) -> None:
+    path = tmp_path / "pois.sqlite"
+    filled(path)
+    overwrite(path)
+    overwrite(copy_of(path))
     with pytest.raises(RegistryError, match="is corrupt"):
-        Registry(path)
+        open_registry_file(path)
+
+
+@pytest.mark.parametrize("damage", [zero_all_but_the_first_page, overwrite])
+def test_damage_while_it_is_open_never_reaches_the_copy(tmp_path: Path, damage: Callable[[Path], bytes]) -> None:
+    path = tmp_path / "pois.sqlite"
+    filled(path)
+    registry = Registry(path)
+    damage(path)
+    with contextlib.suppress(RegistryError):
+        registry.keep_copy()
+    registry.close()
+    assert open_registry_file(copy_of(path))[1] == ""
+
+
+def test_a_copy_that_cannot_be_kept_is_an_error_in_words(tmp_path: Path) -> None:
+    registry = Registry(tmp_path / "pois.sqlite")
+    registry.put(poi("a"))
+    copy_of(tmp_path / "pois.sqlite").mkdir()
+    with pytest.raises(RegistryError, match=r"pois\.sqlite: no copy kept: "):
+        registry.keep_copy()
+    registry.put(poi("b"))
+    assert len(registry.pois()) == 2
 
 
 def test_an_entry_that_breaks_the_contract_is_named(tmp_path: Path) -> None:

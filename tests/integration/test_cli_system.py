@@ -111,14 +111,16 @@ def test_a_reader_that_goes_away_is_no_crash(running):
 
 def test_a_poi_is_added_moved_listed_and_removed_each_edit_acknowledged(ask, running):
     status, out, _ = ask("poi", "add", "lamp", "1", "-2.5", "0.75", "--name", "the lamp", "--tag", "light", "--json")
+    (added,) = json.loads(out)
     lamp = {"poi_id": "lamp", "name": "the lamp", "position_m": [1.0, -2.5, 0.75], "extent_m": 0.5, "tags": ["light"]}
-    assert (status, json.loads(out)) == (0, [lamp])
-    assert lamp in running.state()["pois"]
-    status, out, _ = ask("poi", "move", "lamp", "-1", "0", "2", "--json")
-    moved = lamp | {"position_m": [-1.0, 0.0, 2.0]}
-    assert (status, json.loads(out)) == (0, [moved])
+    assert (status, added | lamp, "@" in added["edited_by"]) == (0, added, True)
+    assert added in running.state()["pois"]
+    status, out, _ = ask("poi", "move", "lamp", "-1", "0", "2", "--by", "anna", "--json")
+    (moved,) = json.loads(out)
+    assert (status, moved["position_m"], moved["edited_by"]) == (0, [-1.0, 0.0, 2.0], "anna")
+    assert moved["edited_ns"] > added["edited_ns"] > 0
     assert moved in json.loads(ask("poi", "list", "--json")[1])
-    assert "the lamp [light]" in " ".join(ask("poi", "list")[1].split())
+    assert " anna the lamp [light]" in " ".join(ask("poi", "list")[1].split())
     assert ask("poi", "remove", "lamp")[0] == 0
     assert "lamp" not in {poi["poi_id"] for poi in running.state()["pois"]}
 

@@ -97,6 +97,16 @@ class TestGetting:
         assert all(health["count"] > 0 for health in healths)
 
 
+def test_json_is_laid_out_for_a_terminal_and_an_unknown_parameter_is_refused(zenoh, running):
+    printed, _ = zenoh("get", "-s", running.key("fusion/state") + "?top=3;format=json", "--decoder", "text")
+    rows = printed.splitlines()
+    assert len(rows) > 40
+    assert any(row.lstrip().startswith('{"poi_id": "P') for row in rows)
+    assert json.loads(printed)["robot"] == ROBOT
+    _, complaints = zenoh("get", "-s", running.key("fusion/state") + "?tops=3", "--decoder", "text")
+    assert "tops: unknown parameter" in complaints
+
+
 class TestEditing:
     @pytest.fixture(autouse=True)
     def _leave_no_poi(self, running):
@@ -129,8 +139,9 @@ class TestEditing:
 
     def test_an_acknowledged_edit_is_answered_with_the_stored_poi(self, zenoh, running):
         key = running.key("fusion/poi/vase2")
-        printed, _ = zenoh("get", "-s", f"{key}?op=put", "-v", json.dumps(VASE), "--decoder", "deixis")
-        assert lines(printed)[0] == {"poi_id": "vase2", "tags": [], **VASE}
+        printed, _ = zenoh("get", "-s", f"{key}?op=put;by=anna", "-v", json.dumps(VASE), "--decoder", "deixis")
+        (stored,) = lines(printed)
+        assert stored == {"poi_id": "vase2", "tags": [], **VASE, "edited_by": "anna", "edited_ns": stored["edited_ns"]}
         assert get_json(running.session, key)[0]["name"] == VASE["name"]
         printed, _ = zenoh("get", "-s", f"{key}?op=delete", "--decoder", "deixis")
         assert lines(printed)[0]["poi_id"] == "vase2"

@@ -225,6 +225,30 @@ def test_poi_asks_for_one_pois_rows_and_entry(full: Desk) -> None:
     assert state.persons[0].pois_total == MAX_POIS
 
 
+def test_state_and_target_tell_whom_a_wall_hides_and_a_belief_is_kept_short() -> None:
+    fusion = core(many(40))
+    fusion.set_walls([((2.0, -1.0), (-9.0, -1.0)), ((2.0, -1.0), (9.0, -1.0))])
+    beliefs, _ = point(fusion, 1)
+    (final,) = fusion.end(None)
+    assert beliefs[-1].persons[0].excluded == []
+    assert (len(final.excluded), final.excluded_total, final.pois_total) == (13, 13, 27)
+    assert {told.reason for told in final.excluded} == {"behind a wall"}
+    assert "; behind a wall: 'n" in final.reason
+    assert " and 10 more" in final.reason
+
+
+def test_state_tells_of_the_poi_asked_for_that_it_is_behind_a_wall(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "pois.sqlite", many(40))
+    desk.fusion.set_walls([((2.0, -1.0), (-9.0, -1.0)), ((2.0, -1.0), (9.0, -1.0))])
+    point(desk.fusion, 1)
+    pois = desk.registry.pois()
+    hidden, seen = (poi.poi_id for poi in (pois[30], pois[10]))
+    (person,) = desk.state(poi=hidden).persons
+    assert ([told.poi_id for told in person.excluded], person.excluded_total) == ([hidden], 13)
+    (person,) = desk.state(poi=seen).persons
+    assert (person.excluded, [row.poi_id for row in person.pois]) == ([], [seen])
+
+
 def test_person_asks_for_one_person(full: Desk) -> None:
     state = full.state(person="2")
     assert [person.person_id for person in state.persons] == [2]
@@ -243,6 +267,7 @@ def test_person_asks_for_one_person(full: Desk) -> None:
         ({"poi": "ghost"}, r"^poi: there is no POI 'ghost'"),
         ({"poi": ""}, "^poi: "),
         ({"person": "-1"}, r"^person: '-1'"),
+        ({"persons": "1"}, "^persons: unknown parameter; there are top, poi, person, format"),
         ({"person": "9" * 400}, "^person: "),
     ],
 )

@@ -167,7 +167,8 @@ def test_left_and_right_are_mirror_images(degrees: list[float], gesture: Pointin
     }  # fmt: skip
     one = judge(seen(*degrees), HandObservation(gesture), HeadObservation(yaw, 3))
     flipped = judge(seen(*[-d for d in degrees]), HandObservation(mirror[gesture]), HeadObservation(-yaw, 3))
-    assert one.chances == pytest.approx(flipped.chances, abs=1e-6)
+    # Bearings are in single precision, of which degrees at 180 and at 0 have not as many.
+    assert one.chances == pytest.approx(flipped.chances, abs=1e-4)
 
 
 def test_a_silent_source_leaves_the_other_one_as_it_is() -> None:

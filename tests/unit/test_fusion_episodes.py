@@ -32,6 +32,8 @@ from deixis_schemas.messages import (
     Track,
     Tracks,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 CONFIG = FusionConfig()
 FPS = 30
@@ -393,6 +395,46 @@ def test_a_stage_that_dies_between_two_that_contradict_each_other_decides_nothin
     scene.fusion.end(None)
     answers = [set(target.poi_ids) for target in scene.targets]
     assert answers[-1] == answers[0] or len(answers[-1]) != 1
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.sampled_from(["point_left", "point_right", "invisible"]),
+    st.integers(-150, 150),
+    st.sampled_from([5.0, 10.0, 25.0]),
+    st.integers(-120, 120) | st.none(),
+    st.sampled_from(["gesture", "headpose"]),
+)
+def test_whatever_is_seen_a_dying_stage_makes_no_answer_more_certain(
+    kind: str, bearing: int, sigma: float, yaw: int | None, dying: str
+) -> None:
+    scene, statuses = Scene(), {dying: ("dead", "gone, silent for 2.0 s")}
+    hand = gesture(kind, hand="left", bearing_deg=float(bearing), bearing_sigma_deg=sigma)
+    head = pose(float(yaw)) if yaw is not None else pose(None, "out_of_range", side="left", beyond_deg=100.0)
+    scene.show(20, hand, head)
+    before = scene.beliefs[-1].persons[0]
+    scene.show(5, hand, head, without=(dying,), statuses=statuses)
+    after = scene.beliefs[-1].persons[0]
+    for name in ("probability", "pignistic"):
+        most = max(getattr(row, name) for row in before.pois)
+        assert max(getattr(row, name) for row in after.pois) <= most + 1e-9
+    assert after.credible_total >= before.credible_total
+    (gone,) = (said for said in after.evidence if said.source == dying)
+    assert (gone.status, gone.weight) == ("dead", 0.0)
+
+
+@pytest.mark.parametrize("yaw", [50, 70, -60])
+def test_a_head_lost_beyond_45_degrees_is_not_read_as_out_of_range(yaw: float) -> None:
+    """However far it was turned when it was lost: what is not seen says nothing, and certainly not that it is out there."""
+    hand = gesture("invisible")
+    lost, unseen, beyond = Scene(), Scene(), Scene()
+    for scene, head in ((lost, pose(None, "lost")), (unseen, None), (beyond, pose(None, "out_of_range", beyond_deg=100.0))):
+        scene.show(3, REST, pose(yaw))
+        scene.show(30, hand, head)
+    told, nothing, far = (scene.beliefs[-1].persons[0] for scene in (lost, unseen, beyond))
+    assert (told.evidence[1].status, told.evidence[1].observed, told.evidence[1].weight) == ("not_tracking", "head lost", 0.0)
+    assert [row.probability for row in told.pois] == [row.probability for row in nothing.pois]
+    assert [row.poi_id for row in told.pois] != [row.poi_id for row in far.pois]
 
 
 def test_a_stage_that_lives_again_is_heard_again() -> None:

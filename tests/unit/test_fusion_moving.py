@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from deixis_fusion import weighing
 from deixis_fusion.config import FusionConfig
-from deixis_fusion.evidence import Sample
+from deixis_fusion.evidence import Evidence, Sample, Witness
 from deixis_fusion.frames import Frames
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.hand_evidence import hand_over
@@ -17,7 +18,9 @@ from deixis_fusion.head_evidence import head_over
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import PersonPlace
 from deixis_fusion.robust import median_angle
-from deixis_fusion.views import MOST_VIEWS, views_of
+from deixis_fusion.sight import Lookout, Points
+from deixis_fusion.views import MOST_VIEWS, last_place, views_of
+from deixis_fusion.visibility import Walls
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     CameraInfo,
@@ -181,3 +184,23 @@ def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
 def test_who_stands_is_seen_from_one_place() -> None:
     weighed = Frames.of([sample(i, i, 60 - i, person=(0.0, 0.01 * (i % 3))) for i in range(150)])
     assert views_of(weighed, hand_over(weighed), head_over(weighed)) == ()
+
+
+def test_of_a_walk_past_very_many_pois_few_cases_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    pois = [Poi(poi_id=f"p{i}", position_m=(*rng.uniform(-8, 8, 2), 1.2), extent_m=rng.uniform(0, 1)) for i in range(600)]
+    weighed = Frames.of([sample(i, 180, 60 + 0.1 * i, person=(0.0, 0.03 * i)) for i in range(60)])
+    hand, head = hand_over(weighed), head_over(weighed)
+    views = views_of(weighed, hand, head)
+    seen = Lookout(0.15).look(last_place(weighed.samples), Points.of(pois), Walls(()))  # type: ignore[arg-type]
+    said = Witness("ok", "")
+    config = FusionConfig()
+    monkeypatch.setattr(weighing, "MANY", 10_000)
+    every = weighing.weigh(Evidence(hand, said, head, said, views), seen, config.hand, config.head)
+    monkeypatch.setattr(weighing, "MANY", 100)
+    few = weighing.weigh(Evidence(hand, said, head, said, views), seen, config.hand, config.head)
+    assert len(views) > 2
+    assert few.joint.shape == every.joint.shape
+    assert few.chances(1.0) == pytest.approx(every.chances(1.0), abs=0.005)
+    likely = every.joint > 0.05 * every.joint.max()
+    assert few.joint[likely] == pytest.approx(every.joint[likely], rel=0.2)

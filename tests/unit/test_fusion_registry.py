@@ -13,7 +13,7 @@ from deixis_fusion.registry import Delete, Put, Registry, RegistryError, default
 from deixis_runtime.queries import Edit, Query, Refused
 from deixis_runtime.site import SitePoi
 from deixis_schemas.codec import encode, encoding_of
-from deixis_schemas.messages import MAX_POIS, Poi
+from deixis_schemas.messages import MAX_REGISTERED, Poi
 
 PREFIX = "deixis/r1/fusion/poi/"
 KEY = PREFIX + "vase"
@@ -54,7 +54,7 @@ def test_deleting_what_is_not_there_is_refused(path: Path) -> None:
 
 def test_a_full_registry_refuses_one_more_and_still_takes_changes(path: Path) -> None:
     registry = Registry(path)
-    registry.apply_site([poi(f"p{i}") for i in range(MAX_POIS)])
+    registry.apply_site([poi(f"p{i}") for i in range(MAX_REGISTERED)])
     with pytest.raises(RegistryError, match="full"):
         registry.put(poi("more"))
     registry.put(poi("p0", 5))
@@ -136,8 +136,8 @@ def test_many_changes_are_one_transaction_and_each_is_refused_on_its_own(path: P
 
 def test_a_full_registry_takes_what_fits_of_many_changes(path: Path) -> None:
     registry = Registry(path)
-    results = registry.apply([Put(poi(f"p{i}")) for i in range(MAX_POIS + 3)])
-    assert [isinstance(result, RegistryError) for result in results] == [False] * MAX_POIS + [True] * 3
+    results = registry.apply([Put(poi(f"p{i}")) for i in range(MAX_REGISTERED + 3)])
+    assert [isinstance(result, RegistryError) for result in results] == [False] * MAX_REGISTERED + [True] * 3
 
 
 def test_where_the_disk_refuses_all_changes_of_a_transaction_are_refused(path: Path) -> None:
@@ -262,6 +262,61 @@ def test_a_refused_edit_names_the_field_and_is_counted(
         edits.answer(asked, 5)
     assert (edits.accepted, edits.rejected, announced) == (0, 1, [])
     assert (edits.rejections[0].key, edits.rejections[0].stamp_ns) == (asked.key, 5)
+
+
+def test_a_parameter_that_is_not_known_is_refused_and_nothing_done(edits: PoiEdits) -> None:
+    with pytest.raises(Refused, match=r"^operation: unknown parameter"):
+        edits.answer(query("deixis/r1/fusion/poi/door", operation="delete"), 0)
+    assert len(edits.answer(query("deixis/r1/fusion/poi/*", _timeout="1", format="json"), 0)) == 2
+
+
+def test_an_edit_says_who_and_when_and_so_does_the_site_file(edits: PoiEdits, path: Path) -> None:
+    edits.answer(query(payload={"position_m": [9, 8, 7], "edited_by": "x", "edited_ns": 3}, by="anna@desk"), 5)
+    edits.take([Edit(PREFIX + "lamp", "put", b'{"position_m": [1, 2, 3], "edited_by": "tool"}', "")], 7)
+    edits._registry.close()
+    kept = {poi.poi_id: (poi.edited_by, poi.edited_ns) for poi in Registry(path).pois()}
+    assert kept == {"vase": ("anna@desk", 5), "lamp": ("tool", 7), "door": ("site file", 0)}
+
+
+def test_who_edited_an_entry_does_not_make_the_site_file_another(path: Path) -> None:
+    registry = Registry(path)
+    registry.apply_site(site(a=1), now_ns=5)
+    assert registry.apply_site(site(a=1), now_ns=9) == []
+    assert registry.pois()[0].edited_ns == 5
+
+
+MANY = "deixis/r1/fusion/poi/*"
+
+
+def test_many_pois_are_put_as_one_edit(edits: PoiEdits, announced: Announced) -> None:
+    many = {f"p{i}": {"position_m": [i, 0, 0]} for i in range(400)}
+    replies = edits.answer(query(MANY, many, op="put_all", by="anna"), 5)
+    assert [key for key, _ in replies] == [f"{PREFIX}p{i}" for i in range(400)]
+    assert (edits.accepted, len(announced), len(edits._registry.pois())) == (400, 400, 402)
+    assert edits._registry.get("p7") == Poi(poi_id="p7", position_m=(7, 0, 0), edited_by="anna", edited_ns=5)
+
+
+@pytest.mark.parametrize(
+    ("key", "second", "complaint"),
+    [
+        (MANY, {"position_m": [1, 2, "x"]}, r"^b: position_m\.2"),
+        (MANY, {"poi_id": "c", "position_m": [1, 2, 3]}, "^poi_id: 'c', but it stands under 'b'"),
+        (MANY, [1, 2, 3], "^b: not an object but list"),
+        (KEY, {"position_m": [1, 2, 3]}, "^key: "),
+    ],
+)
+def test_of_many_pois_all_are_put_or_none(edits: PoiEdits, key: str, second: object, complaint: str) -> None:
+    with pytest.raises(Refused, match=complaint):
+        edits.answer(query(key, {"a": {"position_m": [1, 2, 3]}, "b": second}, op="put_all"), 5)
+    assert places(edits._registry) == {"door": 2, "vase": 1}
+    assert (edits.accepted, edits.rejected) == (0, 1)
+
+
+def test_of_many_pois_that_do_not_fit_none_is_put(edits: PoiEdits) -> None:
+    edits._registry.apply([Put(poi(f"p{i}")) for i in range(MAX_REGISTERED - 3)])
+    with pytest.raises(Refused, match="the registry is full"):
+        edits.answer(query(MANY, {name: {"position_m": [1, 2, 3]} for name in "ab"}, op="put_all"), 5)
+    assert len(edits._registry.pois()) == MAX_REGISTERED - 1
 
 
 def test_an_operation_that_is_not_known_is_refused(edits: PoiEdits) -> None:

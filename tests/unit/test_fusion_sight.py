@@ -54,6 +54,14 @@ def test_sight_is_mutual(ax: float, ay: float, bx: float, by: float) -> None:
     assert sees((ax, ay), (bx, by), [WALL], 0.0) == sees((bx, by), (ax, ay), [WALL], 0.0)
 
 
+def test_an_exhibit_that_the_map_shows_as_occupied_does_not_hide_itself_but_what_is_behind_it() -> None:
+    around = [((3.0, -0.3), (3.6, -0.3)), ((3.6, -0.3), (3.6, 0.3)), ((3.6, 0.3), (3.0, 0.3)), ((3.0, 0.3), (3.0, -0.3))]
+    sight = look(place(1.0, 0.0), (3.3, 0.0), (4.5, 0.0), extent_m=0.7, walls=around)
+    assert [candidate.poi.poi_id for candidate in sight] == ["P0"]
+    partition = [((3.0, -2.0), (3.0, 2.0))]
+    assert len(look(place(1.0, 0.0), (3.3, 0.0), extent_m=0.7, walls=partition)) == 0
+
+
 def test_many_sight_lines_past_many_walls_are_those_of_a_plain_reckoning() -> None:
     rng = np.random.default_rng(2)
     points, first = rng.uniform(-9, 9, (400, 2)), rng.uniform(-9, 9, (60, 2))

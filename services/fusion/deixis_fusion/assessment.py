@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import heapq
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
 from deixis_schemas.messages import Poi
 
 from .decision import Judgement
 from .evidence import Evidence
 from .localisation import PersonPlace
 
+Indices = npt.NDArray[np.intp]
+NONE: Indices = np.zeros(0, dtype=np.intp)
+
 
 class Assessment(NamedTuple):
     """What is thought of one person at one frame. `judgement` is none where no POI comes into question.
 
-    `pois` are all there are; `doubt` says why the robot may have stood elsewhere, if so.
+    `pois` are all there are; `doubt` says why the robot may have stood elsewhere, if so. `hidden` are the places in `pois` of
+    those that the person cannot see for a wall.
     """
 
     place: PersonPlace | None
@@ -23,6 +31,7 @@ class Assessment(NamedTuple):
     judgement: Judgement | None
     pois: Sequence[Poi]
     doubt: str = ""
+    hidden: Indices = NONE
 
     @property
     def poi_ids(self) -> tuple[str, ...]:
@@ -43,3 +52,10 @@ class Assessment(NamedTuple):
     def contour_conflict(self) -> float:
         """How much hand and head contradict each other."""
         return self.judgement.contour_conflict if self.judgement else 0.0
+
+    def nearest_hidden(self, count: int) -> list[Poi]:
+        """The first of the POIs that a wall hides, the nearest to the person first."""
+        if self.place is None:
+            return []
+        here, hidden = self.place.position_m[:2], [self.pois[int(i)] for i in self.hidden]
+        return heapq.nsmallest(count, hidden, key=lambda poi: math.dist(here, poi.position_m[:2]))

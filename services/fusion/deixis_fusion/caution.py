@@ -18,19 +18,20 @@ from .mass_vector import Combined
 
 Values = npt.NDArray[np.float64]
 
+ROUNDING = 1e-12
 GONE = ("dead", "late", "wrong_version")
 WHY = "a stage that spoke for more than one POI is gone"
 
 
 @dataclass(frozen=True)
 class _Heard:
-    """The last judgement with all the stages that had spoken: their names, how sure it was (the chance of the likeliest POI and
-    its pignistic probability), and what it answered.
+    """The last judgement with all the stages that had spoken: their names, how sure it was (what the likeliest POI, the two
+    likeliest, the three ... have together, of chances and of pignistic probabilities), and what it answered.
     """
 
     stages: frozenset[str]
-    chance: float
-    pignistic: float
+    chances: Values
+    pignistic: Values
     poi_ids: frozenset[str]
 
 
@@ -51,7 +52,7 @@ class Caution:
         if heard is not None and any(name in heard.stages and _is_gone(evidence, name) for name in ("gesture", "headpose")):
             return _no_surer(judgement, heard)
         self._heard = _Heard(
-            speaking, float(judgement.chances.max()), float(judgement.pignistic.max()), frozenset(judgement.poi_ids)
+            speaking, _together(judgement.chances), _together(judgement.pignistic), frozenset(judgement.poi_ids)
         )
         return judgement
 
@@ -66,22 +67,31 @@ def _is_gone(evidence: Evidence, name: str) -> bool:
 
 
 def _no_surer(judgement: Judgement, heard: _Heard) -> Judgement:
-    """Chances mixed with equal ones, and masses discounted, until none is larger than the largest was.
+    """Chances mixed with equal ones, and masses discounted, until the likeliest POIs, however many, have no more than they had.
 
-    Both go linearly toward 1 / n. All that was answered before, still is.
+    Both go linearly toward 1 / n. So neither is the credible set smaller. All that was answered before, still is.
     """
     even = 1 / len(judgement.seen)
-    rate = _rate(judgement.chances, heard.chance)
+    rate = _rate(judgement.chances, heard.chances)
     chances = (1 - rate) * judgement.chances + rate * even
     belief = judgement.combination.belief.discounted(_rate(judgement.pignistic, heard.pignistic))
     weakened = replace(judgement, chances=chances, combination=Combined(belief, judgement.combination.conflict))
     return replace(weakened, choice=_no_narrower(weakened, heard))
 
 
-def _rate(shares: Values, most: float) -> float:
-    """How much of the shares must be made equal for none to be larger than `most`."""
-    best, even = float(shares.max()), 1 / len(shares)
-    return min(1.0, (best - most) / (best - even)) if best > most and best > even else 0.0
+def _together(shares: Values) -> Values:
+    """What the likeliest has, the two likeliest, the three ... (n)."""
+    return np.cumsum(np.sort(shares)[::-1])
+
+
+def _rate(shares: Values, most: Values) -> float:
+    """How much of the shares must be made equal for the likeliest to have no more together than `most` (`_together`)."""
+    now, size = _together(shares), len(shares)
+    # Other POIs may have come into sight since: beyond those that there were, all have had everything.
+    allowed = np.concatenate([most[:size], np.full(max(0, size - len(most)), 1.0)])
+    above = now - np.arange(1, size + 1) / size
+    excess = np.divide(now - allowed, above, out=np.zeros(size), where=(now > allowed) & (above > ROUNDING))
+    return float(np.clip(excess.max(), 0.0, 1.0))
 
 
 def _no_narrower(judgement: Judgement, heard: _Heard) -> Choice:

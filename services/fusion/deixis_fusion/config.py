@@ -70,11 +70,20 @@ class HeadConfig(StageConfig):
     at_robot: float = Field(default=0.15, ge=0, lt=1, description="Probability of looking at the robot instead.")
     outlier: float = Field(default=0.05, gt=0, lt=1, description="Probability that the yaw is nonsense.")
     discount: float = Field(default=0.05, ge=0, le=1, description="Mass kept on the whole frame.")
+    # Assumed, not fitted: no clip shows who means which of two shelves. Wide, so that a wrong guess costs little.
+    pitch_sigma_deg: float = Field(default=10, gt=0, le=90, description="How differently people hold the head, up and down.")
+    pitch_gain_min: float = Field(default=0.3, ge=0, le=1.5, description="Smallest part of the way up or down that heads turn.")
+    pitch_gain_max: float = Field(default=1.0, gt=0, le=1.5, description="Largest part of the way up or down that heads turn.")
+    pitch_outlier: float = Field(
+        default=0.5, gt=0, le=1, description="Probability that the pitch is nonsense; at 1 height does not count."
+    )
 
     @model_validator(mode="after")
     def _gains_are_a_range(self) -> HeadConfig:
         if self.gain_min >= self.gain_max:
             raise ValueError("gain_max: must be larger than gain_min")
+        if self.pitch_gain_min >= self.pitch_gain_max:
+            raise ValueError("pitch_gain_max: must be larger than pitch_gain_min")
         return self
 
 

@@ -7,6 +7,8 @@ is 0, and a contradiction is a small number. What is unknown of POIs (their dist
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 from deixis_schemas.messages import BEARING_STEP_DEG, Side
@@ -96,10 +98,15 @@ def _bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:
 
 def _blurred(told: Values, sigma_deg: float) -> Curve:
     """The stage's own likelihood of bearings -180, -175 ... 175 as a density, blurred by a normal distribution."""
-    density = told / (told.sum() * BEARING_STEP_DEG)
+    return np.asarray(_blur(sigma_deg) @ (told / (told.sum() * BEARING_STEP_DEG)))
+
+
+@lru_cache(maxsize=4)
+def _blur(sigma_deg: float) -> Values:
+    """Weights of the stage's bearings (n) in each of ours: (360, n), each row summing to 1."""
     off = (BEARINGS[:, None] - np.arange(-180.0, 180.0, BEARING_STEP_DEG) + 180.0) % FULL_CIRCLE_DEG - 180.0
     weights = np.exp(-0.5 * (off / sigma_deg) ** 2)
-    return np.asarray((weights @ density) / weights.sum(axis=1))
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 # --- the head ---------------------------------------------------------------------------------------------------------

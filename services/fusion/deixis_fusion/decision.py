@@ -43,11 +43,15 @@ class Judgement:
     credible_share: float = 0.9
 
     @cached_property
+    def order(self) -> npt.NDArray[np.intp]:
+        """The hypotheses, the likeliest first."""
+        return np.argsort(-self.chances, kind="stable")
+
+    @cached_property
     def credible(self) -> tuple[int, ...]:
         """The fewest hypotheses, best first, among which the POI meant is with a probability of `credible_share`."""
-        order = np.argsort(-self.chances, kind="stable")
-        needed = int(np.searchsorted(np.cumsum(self.chances[order]), self.credible_share * (1 - 1e-12))) + 1
-        return tuple(int(i) for i in order[:needed])
+        needed = int(np.searchsorted(np.cumsum(self.chances[self.order]), self.credible_share * (1 - 1e-12))) + 1
+        return tuple(self.order[:needed].tolist())
 
     @cached_property
     def pignistic(self) -> Values:

@@ -17,7 +17,6 @@ from .localisation import PersonPlace, wrapped_deg
 from .pointing import PointingGesture
 
 Values = npt.NDArray[np.float64]
-StageStatus = tuple[SourceStatus, str]
 
 NAN = math.nan
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
@@ -25,11 +24,12 @@ POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible
 
 # What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
 # `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
-_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored")
-_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg")
+_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored", "has_curve")
+_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
 _OF_PLACE = ("axis_deg", "x_m", "y_m")
-ROW = {name: i for i, name in enumerate((*_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
+ROW = {name: i for i, name in enumerate(("at_ns", *_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
 SIDES: tuple[Side, ...] = ("left", "right")
+VARIANCE_OF_PITCH = 3  # in `HeadPose.covariance_deg2`
 STATUSES = ("tracking", "out_of_range")
 
 
@@ -57,26 +57,25 @@ class Sample:
     @cached_property
     def row(self) -> bytes:
         """What the frame shows in numbers: `ROW`, packed."""
-        return struct.pack(f"{len(ROW)}d", *self._of_hand(), *self._of_head(), *self._of_place())
+        return struct.pack(f"{len(ROW)}d", self.at_ns, *self._of_hand(), *self._of_head(), *self._of_place())
 
     def _of_hand(self) -> tuple[float, ...]:
         told = self.gesture
         if told is None:
             return (NAN,) * len(_OF_HAND)
-        mirrored = float(told.bearing_mirrored)
-        return (
-            _place_in(POINTING, self.pointing),
-            _place_in(SIDES, told.hand),
-            *_known(told.bearing_deg, told.bearing_sigma_deg),
-            mirrored,
-        )
+        kind, side = _place_in(POINTING, self.pointing), _place_in(SIDES, told.hand)
+        bearing = _known(told.bearing_deg, told.bearing_sigma_deg)
+        return kind, side, *bearing, float(told.bearing_mirrored), 1.0 if told.bearing_likelihood else NAN
 
     def _of_head(self) -> tuple[float, ...]:
         told = self.pose
         if told is None:
             return (NAN,) * len(_OF_HEAD)
         status, side = _place_in(STATUSES, told.status), _place_in(SIDES, told.side)
-        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg)
+        pitch = (NAN, NAN)
+        if told.pitch_deg is not None and told.covariance_deg2 is not None:
+            pitch = told.pitch_deg, math.sqrt(told.covariance_deg2[VARIANCE_OF_PITCH])
+        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg), *pitch
 
     def _of_place(self) -> tuple[float, ...]:
         if self.place is None:
@@ -147,7 +146,8 @@ class HandObservation:
 class HeadObservation:
     """A tracked head: its yaw, or (`yaw_deg` none) that it is turned beyond the range, to `side` where that is known.
 
-    `beyond_deg` is that range, where the stage tells it.
+    `beyond_deg` is that range, where the stage tells it. `pitch_deg` is up, from the line to the camera; it is only there with
+    a sigma that the stage states.
     """
 
     yaw_deg: float | None
@@ -155,6 +155,8 @@ class HeadObservation:
     side: Side | None = None
     agreement: float = 1.0
     beyond_deg: float | None = None
+    pitch_deg: float | None = None
+    pitch_sigma_deg: float | None = None
 
 
 class View(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -25,10 +26,22 @@ class Frames:
     table: Values
 
     @staticmethod
-    def of(samples: Sequence[Sample], weights: Sequence[float] | None = None) -> Frames:
+    def of(samples: Sequence[Sample], weights: Values | None = None) -> Frames:
         """These frames, all of weight 1 where none is given."""
         table = np.frombuffer(b"".join([sample.row for sample in samples])).reshape(len(samples), len(ROW))
-        return Frames(samples, np.ones(len(samples)) if weights is None else np.array(weights, dtype=np.float64), table)
+        return Frames(samples, np.ones(len(samples)) if weights is None else weights, table)
+
+    def weighed(self, weights: Values) -> Frames:
+        """The same frames with these weights."""
+        return Frames(self.samples, weights, self.table)
+
+    @cached_property
+    def _unknown(self) -> Flags:
+        return np.isnan(self.table)
+
+    def tells(self, name: str) -> Flags:
+        """Which frames tell one of the numbers (n)."""
+        return ~self._unknown[:, ROW[name]]
 
     def __len__(self) -> int:
         return len(self.samples)
@@ -43,7 +56,7 @@ class Frames:
 
     def placed(self) -> Frames:
         """Those of which is known where the person stood."""
-        known = ~np.isnan(self.column("axis_deg"))
+        known = self.tells("axis_deg")
         if known.all():
             return self
         return Frames([self.samples[int(i)] for i in np.flatnonzero(known)], self.weights[known], self.table[known])
@@ -55,7 +68,7 @@ class Frames:
         """
         if axis_deg is None:
             return np.zeros(len(self))
-        return np.nan_to_num(wrapped(self.column("axis_deg") - axis_deg))
+        return np.where(self.tells("axis_deg"), wrapped(self.column("axis_deg") - axis_deg), 0.0)
 
 
 def wrapped(angles_deg: Values) -> Values:

@@ -22,7 +22,7 @@ from deixis_schemas.messages import (
 )
 from deixis_schemas.runs import RunClock
 
-from .assessment import Assessment
+from .assessment import NONE, Assessment
 from .caution import Caution
 from .config import FusionConfig
 from .decision import ByMasses, Rules
@@ -211,14 +211,15 @@ class Fusion:
     def _assess(self, person: _Person, evidence: Evidence, moment: _Moment, stroke: Stroke | None) -> Assessment:
         """What is thought of the person, seen from where a stroke was last seen: who points and walks off means the same."""
         place, judgement = (last_place(stroke.samples) if stroke else None) or person.locator.place, None
+        hidden = NONE
         if place is not None:
-            seen = person.lookout.look(place, self._points, self._walls)
+            seen, hidden = person.lookout.look(place, self._points, self._walls), person.lookout.hidden
             if self._config.rules == "paper":
                 seen = seen_by_both(seen, place, self._walls, self._config.place.wall_clearance_m)
             judgement = self._rules.judge(seen, evidence) if len(seen) else None
         if judgement is not None:
             judgement = person.caution.judged(judgement, evidence)
-        return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt)
+        return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt, hidden)
 
     def _final(self, person: _Person, ended: Stroke | None, moment: _Moment, now_ns: int | None) -> list[Target]:
         if ended is None:

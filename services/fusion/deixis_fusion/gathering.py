@@ -94,4 +94,6 @@ def _head_witness(head: HeadObservation | None, pose: HeadPose | None, stage: Wi
         side = f" to the {head.side}" if head.side else ""
         return Witness(stage.status, f"out of range{side}", stage.producer, stamp_ns)
     observed = f"yaw {head.yaw_deg:.1f} +- {head.yaw_sigma_deg or 0:.1f} deg"
+    if head.pitch_deg is not None:
+        observed += f", pitch {head.pitch_deg:.1f} +- {head.pitch_sigma_deg or 0:.1f} deg"
     return Witness(stage.status, observed, stage.producer, stamp_ns)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
-from .evidence import POINTING, SIDES, HandObservation, Sample
-from .frames import Frames, Values
+from .evidence import POINTING, SIDES, HandObservation
+from .frames import Flags, Frames, Values
 from .pointing import PointingGesture
 from .robust import majority, median, median_angle
 
@@ -26,14 +25,15 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
     direction to the camera in each frame.
     """
     kinds = frames.column("kind")
-    pointing = ~np.isnan(kinds)
+    pointing = frames.tells("kind")
     if not pointing.any():
         return None
     gesture, agreement = _vote(kinds[pointing], frames.weights[pointing])
     own = pointing if gesture == "invisible" else kinds == POINTING.index(gesture)
-    side = majority(frames.column("hand")[own], frames.weights[own])
+    sided = own & frames.tells("hand")
+    side = majority(frames.column("hand")[sided], frames.weights[sided])
     hand = None if side is None else SIDES[side]
-    told = own & ~np.isnan(frames.column("bearing_deg"))
+    told = own & frames.tells("bearing_deg")
     if not told.any():
         return HandObservation(gesture, agreement=agreement, hand=hand)
     weights, turns, seen = frames.weights[told], frames.turns_to(axis_deg)[told], frames.column("bearing_deg")[told]
@@ -45,30 +45,30 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
         other, spread_of_other = median_angle(180 - seen + turns, weights)
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
-    curve = _mean_curve([frames.samples[int(i)] for i in np.flatnonzero(told)], weights, turns)
+    curve = _mean_curve(frames, told & frames.tells("has_curve"), axis_deg)
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
 
 
-def _mean_curve(samples: Sequence[Sample], weights: Values, turns_deg: Values) -> tuple[float, ...]:
-    """Of the frames together: their mean, for they show nearly the same, and where they differ either may be right."""
-    curves = [sample.curve for sample in samples if sample.curve is not None]
+def _mean_curve(frames: Frames, told: Flags, axis_deg: float | None) -> tuple[float, ...]:
+    """Of these frames together: their mean, for they show nearly the same, and where they differ either may be right."""
+    curves = [frames.samples[i].curve for i in told.nonzero()[0].tolist()]
     if not curves:
         return ()
-    with_curve = np.array([sample.curve is not None for sample in samples])
-    weights, steps = weights[with_curve], np.round(turns_deg[with_curve] / SAME_AXIS_DEG)
-    stacked, total = np.array(curves), np.zeros(BEARINGS)
-    for step in np.unique(steps):
-        same = steps == step
-        total += _turned(weights[same] @ stacked[same], step * SAME_AXIS_DEG)
-    return tuple((total / weights.sum()).tolist())
+    weights, turns = frames.weights[told], frames.turns_to(axis_deg)[told]
+    turned = _turned(np.array(curves), np.round(turns / SAME_AXIS_DEG) * SAME_AXIS_DEG)
+    return tuple((weights @ turned / weights.sum()).tolist())
 
 
-def _turned(curve: Values, turn_deg: float) -> Values:
-    """The curve of bearings with all of them turned."""
-    if not turn_deg:
-        return curve
-    steps = np.arange(BEARINGS) - turn_deg / BEARING_STEP_DEG
-    return np.asarray(np.interp(steps, np.arange(BEARINGS), curve, period=BEARINGS))
+def _turned(curves: Values, turns_deg: Values) -> Values:
+    """Curves of bearings (m, n) with all bearings of each turned (m), on a line between their values."""
+    if not turns_deg.any():
+        return curves
+    steps = np.arange(BEARINGS) - turns_deg[:, None] / BEARING_STEP_DEG
+    below = np.floor(steps)
+    share, place = steps - below, below.astype(np.intp)
+    rows = np.arange(len(curves))[:, None]
+    low, high = curves[rows, place % BEARINGS], curves[rows, (place + 1) % BEARINGS]
+    return np.asarray(low + share * (high - low))
 
 
 def _vote(kinds: Values, weights: Values) -> tuple[PointingGesture, float]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-import numpy as np
 from deixis_schemas.messages import HeadPose
 
 from .evidence import SIDES, STATUSES, HeadObservation
@@ -40,12 +40,23 @@ def head_over(frames: Frames, axis_deg: float | None = None) -> HeadObservation 
     weights = frames.weights[tracked]
     yaw, spread = median_angle((frames.column("yaw_deg") + frames.turns_to(axis_deg))[tracked], weights)
     stated = median(frames.column("yaw_sigma_deg")[tracked], weights)
-    return HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+    seen = HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
+    return _with_pitch(seen, frames, tracked)
+
+
+def _with_pitch(seen: HeadObservation, frames: Frames, tracked: Flags) -> HeadObservation:
+    """The same with the pitch, where it was told with its sigma in most frames."""
+    told = tracked & frames.tells("pitch_deg")
+    weights = frames.weights[told]
+    if not told.any() or weights.sum() < frames.weights[tracked].sum() / 2:
+        return seen
+    pitch, spread = median_angle(frames.column("pitch_deg")[told], weights)
+    stated = median(frames.column("pitch_sigma_deg")[told], weights)
+    return replace(seen, pitch_deg=pitch, pitch_sigma_deg=math.hypot(stated, spread))
 
 
 def _out_of_range(frames: Frames, beyond: Flags, share: float) -> HeadObservation:
-    side = majority(frames.column("side")[beyond], frames.weights[beyond])
-    limits = frames.column("beyond_deg")
-    told = beyond & ~np.isnan(limits)
-    limit = median(limits[told], frames.weights[told]) if told.any() else None
+    sided, told = beyond & frames.tells("side"), beyond & frames.tells("beyond_deg")
+    side = majority(frames.column("side")[sided], frames.weights[sided])
+    limit = median(frames.column("beyond_deg")[told], frames.weights[told]) if told.any() else None
     return HeadObservation(None, None, None if side is None else SIDES[side], share, limit)

@@ -53,12 +53,13 @@ class HeadSighting:
 
 @dataclass(frozen=True)
 class PersonPlace:
-    """A person's head in the map, and the camera as the person sees it."""
+    """A person's head in the map, and the camera as the person sees it; `camera_roll_deg` as in `CameraMount`."""
 
     position_m: Vector
     camera_m: Vector
     distance_m: float
     sigma_m: float
+    camera_roll_deg: float = 0.0
 
     @cached_property
     def axis_deg(self) -> float:
@@ -74,7 +75,8 @@ def locate(camera: Camera, robot: RobotPlace, head: HeadSighting, sigma: float) 
     centre = _to_map(camera.mount.position_m, robot)
     position = _to_map(_add(camera.mount.position_m, to_base(ray, camera.mount)), robot)
     distance = math.dist(position, centre)
-    return PersonPlace(position_m=position, camera_m=centre, distance_m=distance, sigma_m=distance * sigma)
+    roll = camera.mount.roll_deg
+    return PersonPlace(position, centre, distance, sigma_m=distance * sigma, camera_roll_deg=roll)
 
 
 def depth_of_face(lens: Lens, width_px: float, image_size: tuple[int, int]) -> float:

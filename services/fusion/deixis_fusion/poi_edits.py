@@ -6,14 +6,16 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from deixis_runtime.queries import Edit, Query, Refused, key_matches
+from deixis_runtime.queries import Edit, Query, Refused, check_names, key_matches
 from deixis_schemas.codec import MSGPACK, CodecError, Malformed, WrongType, WrongVersion, parse_json, unpack, validate
 from deixis_schemas.messages import MAX_TEXT, Message, Poi, RejectedEdit
 
 from .registry import Change, Delete, Put, Registry, RegistryError
 
 KEPT_REJECTIONS = 16
-OPERATIONS = ("put", "delete")
+OPERATIONS = ("put", "delete", "put_all")
+PARAMETERS = ("op", "by")
+MAX_BY = 128
 MAX_BYTES = 64 << 10
 # What generic Zenoh clients send: JSON under its own label, as text, or without any.
 JSON_LABELS = ("", "application/json", "text/json", "text/plain", "zenoh/string", "zenoh/bytes")
@@ -44,7 +46,7 @@ class PoiEdits:
         keys, changes, refused = [], [], []
         for edit in edits:
             try:
-                change = self._change(edit.kind, edit.key, edit.payload, edit.encoding)
+                change = self._change(edit.kind, edit.key, edit.payload, edit.encoding, now_ns)
             except EditError as error:
                 refused.append(self._reject(edit.key, str(error), now_ns))
             else:
@@ -58,30 +60,44 @@ class PoiEdits:
         return refused
 
     def answer(self, query: Query, now_ns: int) -> list[tuple[str, Message]]:
-        """Answer a get: the matching POIs each under its own key or, with a payload or `op`, an edit's stored POI.
+        """Answer a get: the matching POIs each under its own key or, with a payload or `op`, an edit's stored POIs.
 
-        A deleted POI is answered as it was. Raises Refused with the field's name.
+        A deleted POI is answered as it was. `by` says who edits. Raises Refused with the field's name.
         """
+        check_names(query.parameters, PARAMETERS)
         operation = query.parameters.get("op", "put" if query.payload else "")
         if not operation:
             keys = ((self._prefix + poi.poi_id, poi) for poi in self._registry.pois())
             return [(key, poi) for key, poi in keys if key_matches(query.key, key)]
         if operation not in OPERATIONS:
-            raise Refused(f"op: '{operation[:40]}' is neither 'put' nor 'delete'")
+            raise Refused(f"op: '{operation[:40]}' is none of {', '.join(OPERATIONS)}")
         try:
-            change = self._change(operation, query.key, query.payload or b"", query.encoding)
-            (result,) = self._registry.apply([change])
-            if isinstance(result, RegistryError):
-                raise result
+            changes = self._changes(operation, query, now_ns)
+            results = self._registry.apply(changes, all_or_none=True)
         except (EditError, RegistryError) as error:
             raise Refused(self._reject(query.key, str(error), now_ns)) from None
-        self.accepted += 1
-        self._announce(result.poi_id, None if isinstance(change, Delete) else result)
-        return [(query.key, result)]
+        stored = [result for result in results if isinstance(result, Poi)]
+        self.accepted += len(stored)
+        for poi in stored:
+            self._announce(poi.poi_id, None if operation == "delete" else poi)
+        return [(self._prefix + poi.poi_id, poi) for poi in stored]
 
-    def _change(self, operation: str, key: str, payload: bytes, encoding: str) -> Change:
+    def _changes(self, operation: str, query: Query, now_ns: int) -> list[Change]:
+        by = query.parameters.get("by", "")[:MAX_BY]
+        if operation == "put_all":
+            return [Put(poi) for poi in self._many(query, by, now_ns)]
+        return [self._change(operation, query.key, query.payload or b"", query.encoding, now_ns, by)]
+
+    def _many(self, query: Query, by: str, now_ns: int) -> list[Poi]:
+        """The POIs of a payload by their ids. Raises EditError that names POI and field."""
+        if query.key != f"{self._prefix}*":
+            raise EditError(f"key: '{query.key[:200]}' is not '{self._prefix}*', the key of all POIs")
+        content = _content(query.payload or b"", query.encoding)
+        return [_stamped(_poi_of(poi_id, fields), by, now_ns) for poi_id, fields in content.items()]
+
+    def _change(self, operation: str, key: str, payload: bytes, encoding: str, now_ns: int, by: str = "") -> Change:
         poi_id = poi_id_of(self._prefix, key)
-        return Delete(poi_id) if operation == "delete" else Put(read_poi(poi_id, payload, encoding))
+        return Delete(poi_id) if operation == "delete" else Put(_stamped(read_poi(poi_id, payload, encoding), by, now_ns))
 
     def _reject(self, key: str, reason: str, now_ns: int) -> str:
         self.rejected += 1
@@ -109,6 +125,23 @@ def read_poi(poi_id: str, payload: bytes, encoding: str) -> Poi:
         raise EditError(str(error)) from None
     if poi.poi_id != poi_id:
         raise EditError(f"poi_id: '{poi.poi_id}', but the key ends in '{poi_id}'")
+    return poi
+
+
+def _stamped(poi: Poi, by: str, now_ns: int) -> Poi:
+    """The POI with who and when: what the asker says of the time does not count."""
+    return poi.model_copy(update={"edited_by": by or poi.edited_by, "edited_ns": now_ns})
+
+
+def _poi_of(poi_id: str, fields: object) -> Poi:
+    if not isinstance(fields, dict):
+        raise EditError(f"{poi_id[:80]}: not an object but {type(fields).__name__}")
+    try:
+        poi = validate(Poi, {"poi_id": poi_id} | fields)
+    except CodecError as error:
+        raise EditError(f"{poi_id[:80]}: {error}") from None
+    if poi.poi_id != poi_id:
+        raise EditError(f"poi_id: '{poi.poi_id}', but it stands under '{poi_id[:80]}'")
     return poi
 
 

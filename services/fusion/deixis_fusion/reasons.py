@@ -12,6 +12,7 @@ from .evidence import HandObservation, HeadObservation
 NOTABLE_CONFLICT = 0.7
 MAX_TITLE = 60
 MAX_TIED_NAMED = 8
+MAX_HIDDEN_NAMED = 3
 
 
 def explain(told: Assessment) -> str:
@@ -21,10 +22,20 @@ def explain(told: Assessment) -> str:
     robot = f"; robot/pose is in doubt: {told.doubt}" if told.doubt else ""
     if judgement is None:
         why = "no POI is in sight of the person" if told.place else "where the person stands is not known"
-        return cut(f"{observed}; no answer: {why}{robot}.", MAX_TEXT)
+        return cut(f"{observed}; no answer: {why}{_hidden(told)}{robot}.", MAX_TEXT)
     if not judgement.choice.hypotheses:
-        return cut(f"{observed}; no answer: {judgement.choice.abstains}{robot}.", MAX_TEXT)
-    return cut(f"{observed}; {_answer_words(judgement)}{_runner_up(judgement)}{_doubt(judgement)}{robot}.", MAX_TEXT)
+        return cut(f"{observed}; no answer: {judgement.choice.abstains}{_hidden(told)}{robot}.", MAX_TEXT)
+    answer = f"{_answer_words(judgement)}{_runner_up(judgement)}{_doubt(judgement)}"
+    return cut(f"{observed}; {answer}{_hidden(told)}{robot}.", MAX_TEXT)
+
+
+def _hidden(told: Assessment) -> str:
+    """Whom a wall hides, the nearest first."""
+    if not len(told.hidden):
+        return ""
+    names = [f"'{title(poi)}'" for poi in told.nearest_hidden(MAX_HIDDEN_NAMED)]
+    more = f" and {len(told.hidden) - len(names)} more" if len(told.hidden) > len(names) else ""
+    return f"; behind a wall: {', '.join(names)}{more}"
 
 
 def _answer_words(judgement: Judgement) -> str:

@@ -7,15 +7,18 @@ import os
 import re
 import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from deixis_schemas.codec import CodecError, decode_json
-from deixis_schemas.messages import MAX_POIS, NAME_PATTERN, Poi
+from deixis_schemas.messages import MAX_REGISTERED, NAME_PATTERN, Poi
 
 FORMAT = 1
 BUSY_MS = 500
 MEMORY = ":memory:"
+BY_SITE = "site file"
+UNEDITED = {"edited_by": "", "edited_ns": 0}
 
 SCHEMA = """
 CREATE TABLE pois (poi_id TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT ROWID;
@@ -25,6 +28,10 @@ CREATE TABLE baseline (poi_id TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT R
 
 class RegistryError(Exception):
     """The file cannot be used, or an edit cannot be done; the text names the file or the field."""
+
+
+class CorruptError(RegistryError):
+    """What the file holds is damaged."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,7 @@ class Registry:
         """Open the file, or make it with its folder; without a path, in memory. Raises RegistryError where that fails."""
         self.path = path or MEMORY
         self._pois: dict[str, Poi] = {}
+        self._copied = False
         try:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,7 +76,8 @@ class Registry:
             self._pois = self._load()
         except sqlite3.Error as error:
             self._db.close()
-            raise RegistryError(f"registry {self.path}: {_cause(error)}") from None
+            kind = CorruptError if _is_damage(error) else RegistryError
+            raise kind(f"registry {self.path}: {_cause(error)}") from None
         except RegistryError:
             self._db.close()
             raise
@@ -81,17 +90,19 @@ class Registry:
         """The POI of that id."""
         return self._pois.get(poi_id)
 
-    def apply(self, changes: Sequence[Change]) -> list[Poi | RegistryError]:
+    def apply(self, changes: Sequence[Change], *, all_or_none: bool = False) -> list[Poi | RegistryError]:
         """Make these changes in their order, as one transaction; on disk when this returns.
 
         Returns for each the POI as it is, or as it was where it is deleted; or why it is refused, as all are where the disk
-        refuses.
+        refuses. With `all_or_none` the first refusal is raised as RegistryError, and nothing is changed.
         """
         after, statements, results = dict(self._pois), list[Statement](), list[Poi | RegistryError]()
         for change in changes:
             try:
                 result, statement = _put(after, change.poi) if isinstance(change, Put) else _delete(after, change.poi_id)
             except RegistryError as error:
+                if all_or_none:
+                    raise
                 results.append(error)
             else:
                 results.append(result)
@@ -101,6 +112,8 @@ class Registry:
         try:
             self._commit(statements)
         except RegistryError as error:
+            if all_or_none:
+                raise
             return [error] * len(results)
         self._pois = after
         return results
@@ -113,33 +126,53 @@ class Registry:
         """Remove a POI; gone from disk when this returns. Returns what it was. Raises RegistryError for an unknown id."""
         return self._apply_one(Delete(poi_id))
 
-    def apply_site(self, site: Sequence[Poi]) -> list[str]:
+    def apply_site(self, site: Sequence[Poi], now_ns: int = 0) -> list[str]:
         """Apply what changed in the site file since it was last applied; returns the ids touched.
 
         Entries that are new, changed or gone since then are put or deleted; an operator's edits to the others persist, also the
-        deletion of an entry that the site file still has. Raises RegistryError.
+        deletion of an entry that the site file still has. `now_ns` is when. Raises RegistryError.
         """
         # A site's own kind of Poi equals no stored one: compare plain ones.
-        wanted = {poi.poi_id: Poi.model_validate(poi.model_dump()) for poi in site}
+        wanted = {poi.poi_id: Poi.model_validate(poi.model_dump() | UNEDITED) for poi in site}
         applied = self._baseline()
         changed = [poi_id for poi_id, poi in wanted.items() if applied.get(poi_id) != poi]
         gone = [poi_id for poi_id in applied if poi_id not in wanted]
         after = (set(self._pois) | set(changed)) - set(gone)
-        if len(after) > MAX_POIS:
-            raise RegistryError(f"registry {self.path}: with the site's POIs it would hold {len(after)}, at most {MAX_POIS}")
+        if len(after) > MAX_REGISTERED:
+            would = f"with the site's POIs it would hold {len(after)}, at most {MAX_REGISTERED}"
+            raise RegistryError(f"registry {self.path}: {would}")
+        stored = {i: wanted[i].model_copy(update={"edited_by": BY_SITE, "edited_ns": now_ns}) for i in changed}
         statements: list[Statement] = []
         for poi_id in changed:
-            content = wanted[poi_id].model_dump_json()
-            statements += [
-                (f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (poi_id, content)) for table in ("pois", "baseline")
-            ]
+            for table, poi in (("pois", stored[poi_id]), ("baseline", wanted[poi_id])):
+                statements.append((f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (poi_id, poi.model_dump_json())))
         for poi_id in gone:
             statements += [(f"DELETE FROM {table} WHERE poi_id = ?", (poi_id,)) for table in ("pois", "baseline")]
         self._commit(statements)
-        self._pois.update({poi_id: wanted[poi_id] for poi_id in changed})
+        self._pois.update(stored)
         for poi_id in gone:
             self._pois.pop(poi_id, None)
         return sorted(changed + gone)
+
+    def keep_copy(self) -> None:
+        """Copy the file, found sound, beside itself where it has changed since the last copy. Raises RegistryError."""
+        if self._copied or not isinstance(self.path, Path):
+            return
+        good = copy_of(self.path)
+        fresh = good.with_name(good.name + ".fresh")
+        try:
+            fresh.unlink(missing_ok=True)
+            with closing(sqlite3.connect(fresh, isolation_level=None)) as copy:
+                self._db.backup(copy)
+                (verdict,) = copy.execute("PRAGMA quick_check(1)").fetchone()
+            if verdict != "ok":
+                raise CorruptError(f"registry {self.path}: no copy kept, it has become corrupt: {verdict}")
+            with fresh.open("rb") as written:
+                os.fsync(written.fileno())
+            fresh.replace(good)
+        except (OSError, sqlite3.Error) as error:
+            raise RegistryError(f"registry {self.path}: no copy kept: {error}") from None
+        self._copied = True
 
     def close(self) -> None:
         """Close the file."""
@@ -172,7 +205,7 @@ class Registry:
     def _load(self) -> dict[str, Poi]:
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
-            raise RegistryError(f"registry {self.path}: is corrupt: {verdict}")
+            raise CorruptError(f"registry {self.path}: is corrupt: {verdict}")
         return self._read("SELECT poi_id, content FROM pois")
 
     def _baseline(self) -> dict[str, Poi]:
@@ -187,7 +220,7 @@ class Registry:
             try:
                 pois[poi_id] = decode_json(Poi, content)
             except (CodecError, TypeError) as error:
-                raise RegistryError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
+                raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
         return pois
 
     def _commit(self, statements: Sequence[Statement]) -> None:
@@ -197,6 +230,7 @@ class Registry:
             for statement, values in statements:
                 self._db.execute(statement, values)
             self._db.execute("COMMIT")
+            self._copied = False
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
@@ -219,8 +253,8 @@ def default_path(robot: str, site: Path) -> Path:
 
 
 def _put(pois: dict[str, Poi], poi: Poi) -> tuple[Poi, Statement]:
-    if poi.poi_id not in pois and len(pois) >= MAX_POIS:
-        raise RegistryError(f"poi_id: the registry is full, it holds {MAX_POIS} POIs")
+    if poi.poi_id not in pois and len(pois) >= MAX_REGISTERED:
+        raise RegistryError(f"poi_id: the registry is full, it holds {MAX_REGISTERED} POIs")
     pois[poi.poi_id] = poi
     return poi, ("INSERT OR REPLACE INTO pois VALUES (?, ?)", (poi.poi_id, poi.model_dump_json()))
 
@@ -235,6 +269,15 @@ def _cause(error: sqlite3.Error) -> str:
     text = str(error)
     if "locked" in text or "busy" in text:
         return "is locked by another process; is another fusion stage running on it?"
-    if "not a database" in text or "malformed" in text:
+    if _is_damage(error):
         return f"is corrupt: {text}"
     return text
+
+
+def _is_damage(error: sqlite3.Error) -> bool:
+    return any(word in str(error) for word in ("not a database", "malformed"))
+
+
+def copy_of(path: Path) -> Path:
+    """Where the last good copy of a registry is."""
+    return path.with_name(path.name + ".good")

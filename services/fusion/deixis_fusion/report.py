@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import NamedTuple
 
-import numpy as np
 from deixis_schemas import messages
 from deixis_schemas.messages import MAX_LISTED, MAX_TEXT, OfFrame, PersonBelief, Poi, PoiBelief, Producer, Target
 
@@ -19,19 +17,21 @@ from .decision import Judgement
 from .evidence import Witness
 from .mass_vector import MassVector
 from .reasons import cut, explain
-from .sight import poi_at
+from .sight import bearings_at, poi_at
 from .visibility import Candidate
 
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
 MAX_MEMBERS = 96
+BEHIND_A_WALL = "behind a wall"
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`."""
+    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`. So many `excluded` ones are named."""
 
     top: int
     poi_id: str | None = None
+    excluded: int = 0
 
 
 class PersonReport(NamedTuple):
@@ -58,6 +58,8 @@ class PersonReport(NamedTuple):
             contour_conflict=told.contour_conflict,
             credible=_credible(told.judgement),
             credible_total=len(told.judgement.credible) if told.judgement else 0,
+            excluded=_excluded(told, rows.poi_id, rows.excluded),
+            excluded_total=len(told.hidden) if rows.excluded else 0,
             evidence=_evidence(told, self.now_ns),
             episode_id=self.episode_id,
         )
@@ -92,6 +94,8 @@ class TargetReport:
             contour_conflict=told.contour_conflict,
             credible=_credible(told.judgement),
             credible_total=len(told.judgement.credible) if told.judgement else 0,
+            excluded=_excluded(told, rows.poi_id, MAX_LISTED),
+            excluded_total=len(told.hidden),
             evidence=_evidence(told, self.now_ns),
             reason=explain(told),
             started_ns=self.started_ns,
@@ -105,24 +109,25 @@ class TargetReport:
 
 def _rows(judgement: Judgement, rows: Rows) -> list[PoiBelief]:
     """The standing of the POIs asked for, best first."""
-    seen, chances = judgement.seen, judgement.chances
-    chosen = (int(i) for i in np.argsort(-chances, kind="stable"))
+    seen, chosen = judgement.seen, judgement.order
     if rows.poi_id is not None:
-        chosen = (i for i in chosen if poi_at(seen, i).poi_id == rows.poi_id)
-    return [_row(judgement, i, seen[i]) for i in islice(chosen, rows.top)]
-
-
-def _row(judgement: Judgement, i: int, candidate: Candidate) -> PoiBelief:
-    alone = float(judgement.combination.belief.single[i])
-    return PoiBelief(
-        poi_id=candidate.poi.poi_id,
-        mass=alone,
-        belief=alone,
-        plausibility=float(judgement.plausibilities[i]),
-        pignistic=float(judgement.pignistic[i]),
-        probability=float(judgement.chances[i]),
-        bearing_deg=candidate.bearing_deg,
-    )
+        chosen = chosen[[poi_at(seen, i).poi_id == rows.poi_id for i in chosen.tolist()]]
+    chosen = chosen[: rows.top]
+    standing = (judgement.combination.belief.single, judgement.plausibilities, judgement.pignistic, judgement.chances)
+    columns = [values[chosen].tolist() for values in standing]
+    told = zip(chosen.tolist(), *columns, bearings_at(seen, chosen), strict=True)
+    return [
+        PoiBelief(
+            poi_id=poi_at(seen, i).poi_id,
+            mass=alone,
+            belief=alone,
+            plausibility=plausibility,
+            pignistic=pignistic,
+            probability=chance,
+            bearing_deg=bearing,
+        )
+        for i, alone, plausibility, pignistic, chance, bearing in told
+    ]
 
 
 def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[PoiBelief]:
@@ -137,6 +142,15 @@ def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[PoiBelief]:
 def _credible(judgement: Judgement | None) -> list[str]:
     """The first of the credible set."""
     return [poi_at(judgement.seen, i).poi_id for i in judgement.credible[:MAX_LISTED]] if judgement else []
+
+
+def _excluded(told: Assessment, poi_id: str | None, most: int) -> list[messages.Excluded]:
+    """The nearest of the POIs that do not come into question, or the one asked for if it is among them."""
+    if poi_id is None:
+        named = told.nearest_hidden(most)
+    else:
+        named = [told.pois[i] for i in told.hidden.tolist() if told.pois[i].poi_id == poi_id][:most]
+    return [messages.Excluded(poi_id=poi.poi_id, reason=BEHIND_A_WALL) for poi in named]
 
 
 # --- evidence ---------------------------------------------------------------------------------------------------------

@@ -23,8 +23,11 @@ ROUNDING = 1e-9
 
 def weigh(samples: Sequence[Sample], settle_s: float) -> Frames:
     """The frames of a stroke with their weights: at the start of a stroke the head may still be on its way."""
-    settled_ns = samples[0].at_ns + int(settle_s * 1e9) if samples else 0
-    return Frames.of(samples, [1.0 if sample.at_ns >= settled_ns else UNSETTLED_WEIGHT for sample in samples])
+    frames = Frames.of(samples)
+    if not samples:
+        return frames
+    at_ns = frames.column("at_ns")
+    return frames.weighed(np.where(at_ns >= at_ns[0] + settle_s * 1e9, 1.0, UNSETTLED_WEIGHT))
 
 
 def median_angle(angles_deg: Values, weights: Values) -> tuple[float, float]:
@@ -42,17 +45,16 @@ def median_angle(angles_deg: Values, weights: Values) -> tuple[float, float]:
 
 def median(values: Values, weights: Values) -> float:
     """Weighted median of these values, one at least."""
-    order = np.argsort(values, kind="stable")
-    reached = np.cumsum(weights[order])
-    middle = int(np.searchsorted(reached, reached[-1] * (0.5 - ROUNDING)))
+    order = values.argsort(kind="stable")
+    reached = weights[order].cumsum()
+    middle = int(reached.searchsorted(reached[-1] * (0.5 - ROUNDING)))
     return float(values[order[middle]])
 
 
 def majority(choices: Values, weights: Values) -> int | None:
-    """The choice (0, 1 ...) of the largest total weight, the earlier one of equals; those that are no number do not count."""
-    known = ~np.isnan(choices)
-    if not known.any():
+    """The choice (0, 1 ...) of the largest total weight, the earlier one of equals; of none, none."""
+    if not len(choices):
         return None
-    chosen = choices[known].astype(np.intp)
-    totals = np.bincount(chosen, weights[known])
-    return int(chosen[np.argmax(totals[chosen])])
+    chosen = choices.astype(np.intp)
+    totals = np.bincount(chosen, weights)
+    return int(chosen[totals[chosen].argmax()])

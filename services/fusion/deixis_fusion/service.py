@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from deixis_runtime.occupancy_map import wall_lines
 from deixis_runtime.queries import Query
 from deixis_runtime.settings import ConfigError
+from deixis_runtime.site import SiteError
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
 from deixis_schemas.messages import MAX_TEXT, CameraInfo, FrameId, Message, Poi, SourceState, Target
@@ -17,6 +19,7 @@ from .joining import STAGES, FrameJoiner, JoinedFrame
 from .localisation import RobotPlace
 from .poi_edits import PoiEdits
 from .registry import Registry, RegistryError, default_path
+from .registry_recovery import open_registry_file
 from .sources import Reading, SourceEnd, SourceMonitor
 from .state import Asked, Standing, state_of
 
@@ -24,6 +27,7 @@ DEPTH = 32
 IDLE_S = 0.25
 # Stages start one after the other; until then a silent one is no fault.
 START_S = 5.0
+COPY_EVERY_S = 60.0
 
 
 class FusionService:
@@ -52,7 +56,8 @@ class FusionService:
         node.serve_get(topics.POI, self._answer_poi, id="**")
         node.serve_get(topics.STATE, self._answer_state)
         self._place_robot()
-        self._fusion.set_pois(registry.pois())
+        self._pois_changed = True
+        self._copy_due_s = 0.0
 
     def wait_s(self) -> float:
         """How long nothing needs to be done without input."""
@@ -71,7 +76,19 @@ class FusionService:
         camera_waits = self._node.lockstep and topics.FRAME.stage in self._node.alive_stages()
         if self._end.is_over(now_s, camera_waits):
             self._publish(self._fusion.end(self._now_ns()))
+        if now_s >= self._copy_due_s:
+            self._copy_due_s = now_s + COPY_EVERY_S
+            self.keep_copy()
         self._report_sources(now_s)
+
+    def keep_copy(self) -> None:
+        """Keep a copy of the registry, where it has changed: for the day that the file is damaged."""
+        try:
+            self._registry.keep_copy()
+        except RegistryError as error:
+            self._node.note("registry copy", str(error))
+        else:
+            self._node.note("registry copy", None)
 
     # --- inputs -------------------------------------------------------------------------------------------------------
 
@@ -94,7 +111,8 @@ class FusionService:
         self._node.note("edits_lost", f"{lost} POI edits lost: they came faster than they could be kept" if lost else None)
 
     def _after_edits(self) -> None:
-        self._fusion.set_pois(self._registry.pois())
+        # Taken over with the next frame: thousands of edits may come before it.
+        self._pois_changed = True
         rejected = self._edits.rejected
         self._count_to("edits_rejected", rejected)
         last = self._edits.rejections[-1] if self._edits.rejections else None
@@ -124,7 +142,7 @@ class FusionService:
         site = self._node.site
         if site is None:
             return
-        self._fusion.set_walls(site.walls)
+        self._fusion.set_walls(wall_lines(site))
         pose = site.robot_pose
         self._fusion.start_robot_at(RobotPlace(pose.x_m, pose.y_m, pose.yaw_deg))
 
@@ -152,6 +170,9 @@ class FusionService:
         return None if self._node.lockstep else self._node.now_ns()
 
     def _answer_frame(self, frame: JoinedFrame, now_s: float) -> None:
+        if self._pois_changed:
+            self._fusion.set_pois(self._registry.pois())
+            self._pois_changed = False
         with self._node.step():
             statuses = {stage: self._monitor.status(stage, missed=True) for stage in frame.missing}
             belief, targets = self._fusion.answer(frame, statuses, self._now_ns())
@@ -226,17 +247,25 @@ class FusionService:
 
 
 def serve(node: Node, config: FusionConfig) -> None:
-    """Run the stage until told to stop. Raises ConfigError where the registry cannot be used."""
+    """Run the stage until told to stop. Raises ConfigError where registry or map cannot be used."""
     try:
         registry = open_registry(node, config)
     except RegistryError as error:
         raise ConfigError(str(error)) from None
     try:
-        service = FusionService(node, config, registry)
+        service = _service(node, config, registry)
         while node.wait(service.wait_s()):
             service.step()
+        service.keep_copy()
     finally:
         registry.close()
+
+
+def _service(node: Node, config: FusionConfig, registry: Registry) -> FusionService:
+    try:
+        return FusionService(node, config, registry)
+    except SiteError as error:
+        raise ConfigError(str(error)) from None
 
 
 def open_registry(node: Node, config: FusionConfig) -> Registry:
@@ -251,10 +280,13 @@ def open_registry(node: Node, config: FusionConfig) -> Registry:
         path = default_path(node.robot, node.site.path)
     else:
         node.note("registry", "no site and no registry file: the POIs last as long as this process")
-    registry = Registry(path)
+    registry, recovered = open_registry_file(path) if path is not None else (Registry(None), "")
+    if recovered:
+        node.warn("registry", recovered)
+        node.note("registry", recovered)
     if node.site is not None:
         try:
-            touched = registry.apply_site(node.site.pois)
+            touched = registry.apply_site(node.site.pois, node.now_ns())
         except RegistryError:
             registry.close()
             raise

@@ -21,18 +21,30 @@ from .visibility import Candidate, Walls
 
 Values = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
-Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
 # With a distance known to a tenth, the bearing of a POI 0.6 m from the person goes in steps of 4 degrees, the sigma of a head;
 # that of farther ones in smaller steps.
 CASES = 15
-_SHARES = (np.arange(CASES) + 0.5) / CASES
-_QUANTILES = np.array([NormalDist().inv_cdf(share) for share in _SHARES])
-# Their middles have less variance than the distribution that they stand for.
-DISTANCE_ERRORS: Values = _QUANTILES / _QUANTILES.std()
-# Across a POI, spread so that no part of it goes with one distance (multiples of the golden ratio).
-ACROSS: Singles = ((np.arange(CASES) * (math.sqrt(5) - 1) / 2) % 1 - 0.5).astype(np.float32)
+# Enough for POIs whose bearing is known to `FEW_BELOW_DEG`: they go in steps of 3 degrees then.
+FEW_CASES = 5
+FEW_BELOW_DEG = 4.0
+
+
+def _distance_errors(count: int) -> Values:
+    """So many equally likely values of a standard normal distribution."""
+    middles = np.array([NormalDist().inv_cdf((i + 0.5) / count) for i in range(count)])
+    # Middles have less variance than the distribution that they stand for.
+    return np.asarray(middles / middles.std())
+
+
+def _across(count: int) -> Singles:
+    """So many places across a POI, spread so that no part of it goes with one distance (multiples of the golden ratio)."""
+    return ((np.arange(count) * (math.sqrt(5) - 1) / 2) % 1 - 0.5).astype(np.float32)
+
+
+DISTANCE_ERRORS = _distance_errors(CASES)
+ERRORS = {count: (_distance_errors(count), _across(count)) for count in (CASES, FEW_CASES)}
 LEAST_AWAY_M = 0.05
 WIDEST_SIGMA_DEG = 60.0
 # Sight lines are looked along anew where the person has moved by more: less than what hangs on a wall stands off it.
@@ -40,17 +52,22 @@ HELD_M = 0.02
 
 
 class Points(NamedTuple):
-    """POIs as arrays: positions in the map (n, 2) and sizes across (n), metres."""
+    """POIs as arrays: positions in the map (n, 2), with height (n, 3), and sizes across (n), metres."""
 
     pois: Sequence[Poi]
-    xy: Values
+    xyz: Values
     extent: Values
+
+    @property
+    def xy(self) -> Values:
+        """Positions seen from above."""
+        return self.xyz[:, :2]
 
     @staticmethod
     def of(pois: Sequence[Poi]) -> Points:
         """The POIs in their order."""
-        xy = np.array([poi.position_m[:2] for poi in pois], dtype=np.float64).reshape(-1, 2)
-        return Points(pois, xy, np.array([poi.extent_m for poi in pois], dtype=np.float64))
+        xyz = np.array([poi.position_m for poi in pois], dtype=np.float64).reshape(-1, 3)
+        return Points(pois, xyz, np.array([poi.extent_m for poi in pois], dtype=np.float64))
 
 
 class Bearings(NamedTuple):
@@ -63,11 +80,15 @@ class Bearings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sight(Sequence[Candidate]):
-    """The POIs in question and their bearings. `points` and `chosen` (which of them are in sight) allow for other places."""
+    """The POIs in question and their bearings. `points` and `chosen` (which of them are in sight) allow for other places.
+
+    `place` is where they are seen from; none where bearings alone are known.
+    """
 
     bearings: Bearings
     points: Points
     chosen: Indices
+    place: PersonPlace | None = None
 
     @staticmethod
     def of(candidates: Sequence[Candidate]) -> Sight:
@@ -78,14 +99,16 @@ class Sight(Sequence[Candidate]):
         sigma = np.array([candidate.bearing_sigma_deg for candidate in candidates], dtype=np.float64)
         cases = likeliest + DISTANCE_ERRORS[:, None] * sigma
         bearings = Bearings(likeliest, sigma, cases.astype(np.float32))
-        points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 2)), np.zeros(len(sigma)))
+        points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 3)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
-    def cases_from(self, places: Sequence[PersonPlace], part: slice) -> Singles:
-        """Bearings of a part of these POIs in all cases (v, CASES, n): from these v places, or from where they are seen now."""
+    def cases_from(self, places: Sequence[PersonPlace], part: Indices, count: int = CASES) -> Singles:
+        """Bearings of a part of these POIs in all cases (v, CASES, n): from where they are seen now or, in `count` cases, from
+        these v places.
+        """
         if not places:
             return self.bearings.cases[None, :, part]
-        return _cases(places, _Turned.of(places, self.points, self.chosen[part]))
+        return _cases(places, _Turned.of(places, self.points, self.chosen[part]), count)
 
     def poi(self, i: int) -> Poi:
         """The i-th POI in sight."""
@@ -112,6 +135,14 @@ def poi_at(seen: Sequence[Candidate], i: int) -> Poi:
     return seen.poi(i) if isinstance(seen, Sight) else seen[i].poi
 
 
+def bearings_at(seen: Sequence[Candidate], chosen: Indices) -> list[float]:
+    """The likeliest bearings of some of the POIs that are seen, degrees."""
+    if isinstance(seen, Sight):
+        bearings: list[float] = seen.bearings.likeliest[chosen].tolist()
+        return bearings
+    return [seen[i].bearing_deg for i in chosen.tolist()]
+
+
 class Lookout:
     """The POIs in sight of one person, from frame to frame. Sight lines are kept while the person stands still."""
 
@@ -120,12 +151,12 @@ class Lookout:
         self._clearance_m = clearance_m
         self._kept: tuple[Points, Walls] | None = None
         self._eye = (0.0, 0.0)
-        self._hidden: Flags = np.zeros(0, dtype=np.bool_)
+        self._hidden: Indices = np.zeros(0, dtype=np.intp)
         self._index: Indices = np.zeros(0, dtype=np.intp)
 
     @property
-    def hidden(self) -> Flags:
-        """Which of the POIs a wall hid when last looked for."""
+    def hidden(self) -> Indices:
+        """Which of the POIs a wall hid when last looked for, as places in their order."""
         return self._hidden
 
     def look(self, place: PersonPlace, points: Points, walls: Walls) -> Sight:
@@ -133,10 +164,10 @@ class Lookout:
         eye = (place.position_m[0], place.position_m[1])
         same = self._kept is not None and self._kept[0] is points and self._kept[1] is walls
         if not same or math.dist(eye, self._eye) > HELD_M:
-            self._hidden = walls.hide(eye, points.xy, self._clearance_m)
-            self._index = np.flatnonzero(~self._hidden)
+            hidden = walls.hide(eye, points.xy, self._clearance_m, points.extent / 2 + self._clearance_m)
+            self._hidden, self._index = np.flatnonzero(hidden), np.flatnonzero(~hidden)
             self._kept, self._eye = (points, walls), eye
-        return Sight(bearings_from(place, points, self._index), points, self._index)
+        return Sight(bearings_from(place, points, self._index), points, self._index, place)
 
 
 class _Turned(NamedTuple):
@@ -175,22 +206,23 @@ def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearing
     likeliest = np.degrees(np.arctan2(left, turned.ahead[0] + turned.distance[0]))
     across = np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12))
     sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, away)))
-    return Bearings(likeliest, sigma, _cases([place], turned)[0])
+    return Bearings(likeliest, sigma, _cases([place], turned, CASES)[0])
 
 
-def _cases(places: Sequence[PersonPlace], turned: _Turned) -> Singles:
-    """Bearings from v places in all cases (v, CASES, n).
+def _cases(places: Sequence[PersonPlace], turned: _Turned, count: int) -> Singles:
+    """Bearings from v places in so many cases, as `ERRORS` has them: (v, count, n).
 
     In each the person stands on the line through camera and head, which the picture tells well; how far along it, is known to
     `place.sigma_m`.
     In single precision, a hundred thousandth of a degree: half as many bytes, of the most there is to reckon.
     """
+    errors, across = ERRORS[count]
     relative = np.array([place.sigma_m / place.distance_m if place.distance_m > 0 else 0.0 for place in places])
-    steps = (turned.distance * np.exp(relative[:, None] * DISTANCE_ERRORS)).astype(np.float32)
+    steps = (turned.distance * np.exp(relative[:, None] * errors)).astype(np.float32)
     # The angle of a part of the POI, for small angles; a POI that one stands in lies anywhere.
     wide = np.degrees(np.minimum(turned.extent / turned.away, math.pi / 2)).astype(np.float32)
     bearings = turned.ahead.astype(np.float32)[:, None, :] + steps[:, :, None]
     np.arctan2(turned.left.astype(np.float32)[:, None, :], bearings, out=bearings)
     bearings *= np.float32(math.degrees(1))
-    bearings += ACROSS[:, None] * wide[:, None, :]
+    bearings += across[:, None] * wide[:, None, :]
     return bearings

@@ -6,13 +6,25 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from deixis_runtime.queries import Refused
-from deixis_schemas.messages import MAX_PERSONS, MAX_POIS, MAX_TEXT, NAME_PATTERN, FrameId, Producer, SourceState, State
+from deixis_runtime.queries import Refused, check_names
+from deixis_schemas.messages import (
+    MAX_LISTED,
+    MAX_PERSONS,
+    MAX_POIS,
+    MAX_TEXT,
+    NAME_PATTERN,
+    FrameId,
+    Producer,
+    SourceState,
+    State,
+)
 
 from .fusion import Fusion
 from .poi_edits import PoiEdits
 from .registry import Registry
 from .report import Rows
+
+PARAMETERS = ("top", "poi", "person")
 
 
 @dataclass(frozen=True)
@@ -25,11 +37,12 @@ class Asked:
     @staticmethod
     def by(parameters: Mapping[str, str], registry: Registry, rows: int) -> Asked:
         """Read the selector's parameters; without `top` there are so many rows. Raises Refused with the parameter's name."""
+        check_names(parameters, PARAMETERS)
         top = _number(parameters, "top", 1, MAX_POIS)
         poi_id = parameters.get("poi")
         if poi_id is not None and (not re.fullmatch(NAME_PATTERN, poi_id) or registry.get(poi_id) is None):
             raise Refused(f"poi: there is no POI '{poi_id[:80]}'")
-        return Asked(Rows(rows if top is None else top, poi_id), _number(parameters, "person", 0, 2**63 - 1))
+        return Asked(Rows(rows if top is None else top, poi_id, MAX_LISTED), _number(parameters, "person", 0, 2**63 - 1))
 
     def wants(self, person_id: int) -> bool:
         """Whether this person was asked for."""

@@ -12,6 +12,8 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
+import numpy as np
+
 from .evidence import HandObservation, HeadObservation, Sample, View
 from .frames import Frames
 from .hand_evidence import hand_over
@@ -31,7 +33,10 @@ def last_place(samples: Sequence[Sample]) -> PersonPlace | None:
 def views_of(frames: Frames, hand: HandObservation | None, head: HeadObservation | None) -> tuple[View, ...]:
     """The parts of a stroke of which hand and head are known as a whole; none where it was seen from one place."""
     placed, apart_m = frames.placed(), APART_M
-    spots = list(zip(placed.column("x_m").tolist(), placed.column("y_m").tolist(), strict=True))
+    x, y = placed.column("x_m"), placed.column("y_m")
+    if not len(placed) or np.hypot(x - x[0], y - y[0]).max() <= apart_m:
+        return ()
+    spots = list(zip(x.tolist(), y.tolist(), strict=True))
     while len(starts := _starts(spots, apart_m)) > MOST_VIEWS:
         apart_m *= 1.5
     if len(starts) < 2:
@@ -70,7 +75,7 @@ def _view(part: Frames, hand: HandObservation | None, head: HeadObservation | No
 # Of a walk only the last part changes from frame to frame.
 @lru_cache(maxsize=8 * MOST_VIEWS)
 def _shown(samples: tuple[Sample, ...], weights: tuple[float, ...]) -> tuple[HandObservation | None, HeadObservation | None]:
-    frames, place = Frames.of(samples, weights), last_place(samples)
+    frames, place = Frames.of(samples, np.array(weights)), last_place(samples)
     axis_deg = place.axis_deg if place is not None else None
     return hand_over(frames, axis_deg), head_over(frames, axis_deg)
 

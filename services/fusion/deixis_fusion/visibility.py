@@ -38,10 +38,11 @@ class Walls:
         ends = np.array(walls, dtype=np.float64).reshape(-1, 2, 2)
         self._from, self._to = ends[:, 0] @ np.array([1, 1j]), ends[:, 1] @ np.array([1, 1j])
 
-    def hide(self, eye: Point2, points: Values, clearance_m: float) -> npt.NDArray[np.bool_]:
+    def hide(self, eye: Point2, points: Values, clearance_m: float, reach_m: Values | None = None) -> npt.NDArray[np.bool_]:
         """Which of the points (n, 2), map frame, a wall hides from the eye.
 
-        POIs hang on walls, on either side of the line that stands for one: the last `clearance_m` of the way do not count.
+        POIs hang on walls, on either side of the line that stands for one: the last `clearance_m` of the way do not count. Nor
+        does a line that lies within `reach_m` (n) of the point: in a map of what is occupied an exhibit is a wall itself.
         """
         hidden = np.zeros(len(points), dtype=np.bool_)
         if not len(self._from) or not len(points):
@@ -54,7 +55,11 @@ class Walls:
         point = order[rank]
         reach = np.abs(ways[point]) - clearance_m
         blocked = (reach > 0) & (_distance_to(first[wall], second[wall], ways[point]) <= reach + ROUNDING)
-        hidden[point[blocked]] = True
+        wall, point = wall[blocked], point[blocked]
+        if reach_m is not None:
+            farther = np.maximum(np.abs(first[wall] - ways[point]), np.abs(second[wall] - ways[point]))
+            point = point[farther > reach_m[point]]
+        hidden[point] = True
         return hidden
 
 

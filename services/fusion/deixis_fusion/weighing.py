@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -15,13 +15,16 @@ from .config import HandConfig, HeadConfig
 from .confusion import HandConfusion
 from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
-from .sight import Sight
+from .height import likelihoods
+from .localisation import PersonPlace
+from .sight import CASES, FEW_BELOW_DEG, FEW_CASES, Indices, Sight
 
 Values = npt.NDArray[np.float64]
 
 NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 4096
+MANY = 500
 
 
 class Weighing(NamedTuple):
@@ -73,19 +76,51 @@ def weigh(
         even = np.ones(len(seen))
         return Weighing(even, even, even, even)
     places = [view.place for view in views if view.place is not None]
-    at_a_time = max(1, AT_A_TIME // len(views))
-    parts = [_part(told, seen.cases_from(places, slice(start, start + at_a_time))) for start in range(0, len(seen), at_a_time)]
-    hand, head, joint, most = np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
+    found = np.empty((4, len(seen)))
+    for part, count in _parts(seen, places):
+        found[:, part] = _part(told, seen.cases_from(places, part, count))
+    hand, head, joint, most = found
     best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
     floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
-    return Weighing(hand, head, joint, most / best, floor)
+    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, head_config)
+
+
+def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices, int]]:
+    """POIs that are weighed together, and in how many cases.
+
+    Of a walk past very many those whose bearing is well known are weighed in few cases: each is weighed from every place.
+    """
+    everybody = np.arange(len(seen))
+    well_known = seen.bearings.sigma < FEW_BELOW_DEG
+    groups = [(everybody, CASES)]
+    if places and len(seen) > MANY:
+        groups = [(everybody[~well_known], CASES), (everybody[well_known], FEW_CASES)]
+    for which, count in groups:
+        at_a_time = max(1, AT_A_TIME * CASES // (count * max(1, len(places))))
+        for start in range(0, len(which), at_a_time):
+            yield which[start : start + at_a_time], count
+
+
+def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: HeadConfig) -> Weighing:
+    """The same with how high the head looks, where that was measured and from one place (`height.py`).
+
+    How well a POI fits is about directions: a pitch that is wrong makes no POI one that nobody can have meant.
+    """
+    if evidence.head is None or evidence.views or seen.place is None:
+        return weighed
+    xyz, extent = seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen]
+    high = likelihoods(evidence.head, seen.place, xyz, extent, config)
+    if high is None:
+        return weighed
+    floor = weighed.head_floor * float(high.min())
+    return Weighing(weighed.hand, weighed.head * high, weighed.joint * high, weighed.fit, floor)
 
 
 def _part(told: Mapping[str, Values], cases: Singles) -> Values:
     """Of a part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
-    likelihoods = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
-    joint = np.asarray(math.prod(likelihoods.values()))
-    means = [likelihoods[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
+    of_source = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
+    joint = np.asarray(math.prod(of_source.values()))
+    means = [of_source[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
     return np.array([*means, joint.mean(axis=0), joint.max(axis=0)], dtype=np.float64)
 
 

@@ -39,7 +39,7 @@ class HeldHand:
 
     @property
     def is_open_palm(self) -> bool:
-        """An open hand that shows its palm: of hands that point 2 in a hundred look so, of those that stop or wave 40 and 30."""
+        """An open hand that shows its palm: 2 of a hundred that point look so, 40 and 30 of those that stop or wave."""
         return self.is_open and self.breadth >= OPEN_PALM
 
     @property

@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 from deixis_camera.calibration import AssumedFieldOfView, Calibration, CalibrationError, Intrinsics, load_calibration
 from deixis_camera.config import CameraConfig
 from deixis_fusion.config import FusionConfig
+from deixis_runtime.occupancy_map import wall_lines
 from deixis_runtime.settings import StageConfig
-from deixis_runtime.site import Site, SitePoi
+from deixis_runtime.site import Site, SiteError, SitePoi
 from deixis_schemas.codec import say
 from pydantic import ValidationError
 
@@ -111,14 +112,18 @@ def ground_of(site: Site) -> Ground:
         raise RehearsalError(
             f"site file {site.path}: pois: all are beyond {FARTHEST_M:g} m from the robot; is robot_pose right?"
         )
-    if len(site.walls) > MOST_WALLS_DRAWN:
-        notes.append(f"of {len(site.walls)} walls the {MOST_WALLS_DRAWN} nearest are drawn; all of them hide POIs")
+    try:
+        walls = wall_lines(site)
+    except SiteError as error:
+        raise RehearsalError(str(error)) from None
+    if len(walls) > MOST_WALLS_DRAWN:
+        notes.append(f"of {len(walls)} walls the {MOST_WALLS_DRAWN} nearest are drawn; all of them hide POIs")
     return Ground(
         name=site.name or site.path.stem,
         camera=camera,
         fps=max(1, min(USUAL_FPS, round(settings.rate_hz or USUAL_FPS))),
         pois=near,
-        walls=tuple((frame.of_map(a), frame.of_map(b)) for a, b in site.walls),
+        walls=tuple((frame.of_map(a), frame.of_map(b)) for a, b in walls),
         frame=frame,
         clearance_m=fusion.place.wall_clearance_m,
         pinhole_px=pinhole_px,
