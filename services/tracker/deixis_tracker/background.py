@@ -73,9 +73,8 @@ class Background:
         """(H, W) uint8, 255 where the picture differs from the room under today's light. `frozen`: 255 where people are."""
         self._expected = self._under_light(image, frozen)
         difference = cv2.absdiff(image, self._expected)
-        b, g, r = cv2.split(difference)
-        largest = cv2.max(cv2.max(b, g), r)
-        changed = np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
+        alike = cv2.inRange(difference, (0, 0, 0), (self._threshold,) * 3)
+        changed = np.asarray(cv2.bitwise_not(alike), np.uint8)
         return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, EDGES), np.uint8) if self._moves else changed
 
     @property
@@ -114,12 +113,14 @@ class Background:
         elif self._moves:
             self._learn(image, np.asarray(room, np.uint8), MOVING_RATE)
         elif updates:
-            self._learn(image, np.asarray(room & (changed == 0), np.uint8), repeated(STEADY_RATE, updates))
-            self._learn(image, np.asarray(room & (changed != 0), np.uint8), repeated(CHANGED_RATE, updates))
+            steady = changed == 0
+            self._learn(image, np.asarray(room & steady, np.uint8), repeated(STEADY_RATE, updates))
+            self._learn(image, np.asarray(room & ~steady, np.uint8), repeated(CHANGED_RATE, updates))
+        if self.unstable or self._moves or updates:
+            self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
     def _learn(self, image: Image, where: Mask, rate: float) -> None:
         cv2.accumulateWeighted(image, self._mean, rate, mask=where)
-        self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
     def _under_light(self, image: Image, frozen: Mask) -> Image:
         """The room under today's light: one gain per channel, the median ratio over the room."""

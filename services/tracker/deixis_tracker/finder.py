@@ -10,6 +10,7 @@ OpenCV's `dnn` runs it: it comes with the OpenCV that the tracker needs anyway, 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -51,7 +52,7 @@ class Surroundings:
         """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
         self._maps = maps
         self._x0, self._y0, self._scale = x0, y0, scale
-        self._summits: dict[int, tuple[Maps, list[tuple[int, int]]]] = {}
+        self._summits: dict[int, tuple[list[float], list[tuple[int, int]]]] = {}
         self._seen: dict[tuple[int, int, int], Seen] = {}
 
     def moved(self, shift: Shift) -> Surroundings:
@@ -85,8 +86,8 @@ class Surroundings:
         # Each is worked out once, for these are asked for again and again: for each blob, and until the next look.
         if kind not in self._summits:
             self._summits[kind] = _summits(self._maps[kind])
-        odds, cells = self._summits[kind]
-        return [self._peak(kind, *cell) for cell in cells[: int(np.count_nonzero(odds >= least))]]
+        heights, cells = self._summits[kind]
+        return [self._peak(kind, *cell) for cell in cells[: bisect_right(heights, -least)]]
 
     def _peak(self, kind: int, row: int, column: int) -> Seen:
         at = kind, row, column
@@ -162,12 +163,13 @@ def apart(heads: list[Seen]) -> list[Seen]:
     return kept
 
 
-def _summits(odds: Maps) -> tuple[Maps, list[tuple[int, int]]]:
-    """Odds and cells (row, column) of a map's local maxima, the highest first."""
+def _summits(odds: Maps) -> tuple[list[float], list[tuple[int, int]]]:
+    """Odds, their sign turned, and cells (row, column) of a map's local maxima, the highest first."""
     rows, columns = np.nonzero(odds >= cv2.dilate(odds, NEIGHBOURS))
-    order = np.argsort(-odds[rows, columns], kind="stable")
+    turned = -odds[rows, columns]
+    order = np.argsort(turned, kind="stable")
     cells = list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
-    return odds[rows[order], columns[order]], cells
+    return turned[order].tolist(), cells
 
 
 def _summit(line: Maps, k: int) -> float:

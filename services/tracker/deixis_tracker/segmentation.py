@@ -59,8 +59,7 @@ def hand_blobs(
     allowed = cv2.bitwise_or(foreground, np.asarray(certain, np.uint8))
     heads = head_zone((skin.shape[0], skin.shape[1]), persons, 0.0)
     near_head = head_zone((skin.shape[0], skin.shape[1]), persons, FACE_RIM)
-    allowed[heads > 0] = 0
-    probability = np.asarray(cv2.bitwise_and(skin, allowed), np.uint8)
+    probability = np.asarray(cv2.bitwise_and(skin, cv2.subtract(allowed, heads)), np.uint8)
     least = 0.8 * config.min_hand_area * min(p.width for p in persons) ** 2 * COARSE**2
     labels, stats, kept = hysteresis(probability, config.skin_low, config.skin_high, max(4, int(least)))
     blobs = []
