@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from deixis_tracker.camera_motion import Matrix, Shift
 from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, repeated
+from deixis_tracker.median import median
 
 UPDATE_S = 0.1
 STEADY_RATE, CHANGED_RATE = 0.1, 0.02  # of learning, per update
@@ -131,18 +132,12 @@ class Background:
         gains = []
         for c in range(3):
             usable = (room[:, c] > 20) & (room[:, c] < 245) & (seen[:, c] < 245)
-            gains.append(_median(seen[usable, c] / room[usable, c]) if usable.sum() >= 20 else 1.0)
+            gains.append(float(median(seen[usable, c] / room[usable, c])) if usable.sum() >= 20 else 1.0)
         if max(abs(gain - 1) for gain in gains) < SAME_LIGHT:
             return self._shown
         levels = np.arange(256, dtype=np.float32)[:, None] * np.array(gains, np.float32)
         table = np.clip(levels, 0, 255).astype(np.uint8)[None]
         return np.asarray(cv2.LUT(self._shown, table), np.uint8)
-
-
-def _median(values: NDArray[np.float32]) -> float:
-    """That of numpy, in a third of its time."""
-    ordered = np.sort(values)
-    return float(ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1].mean())
 
 
 class MotionHistory:

@@ -73,6 +73,7 @@ class Person:
     since_ns: int
     seen_ns: int
     face_ns: int = -(10**18)  # when its face was seen from the front and uncovered last
+    no_face_ns: int = -(10**18)  # when it was looked for there last and not seen
     back_ns: int = -(10**18)  # when it was seen so again, after it was turned away or covered
     support: float = 1.0
     observed: bool = True
