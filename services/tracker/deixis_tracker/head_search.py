@@ -1,6 +1,7 @@
 """Looks for heads that nobody follows yet: the whole picture, a scale at a time, and again at places where one may be.
 
-A single look can be wrong, so the log odds of several looks are added up before a head is believed.
+Of frames larger than VGA, parts are looked at in turn with the whole, in which far people are too small; it is still one
+look at a time. A single look can be wrong, so the log odds of several looks are added up before a head is believed.
 """
 
 from __future__ import annotations
