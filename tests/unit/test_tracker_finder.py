@@ -13,11 +13,14 @@ from deixis_tracker.finder import (
     USUAL_PX,
     WIDTH_PER_BREADTH,
     Finder,
+    Look,
     Seen,
     Surroundings,
     apart,
-    search_scales,
+    close_looks,
+    whole_looks,
 )
+from deixis_tracker.frame import Box
 from deixis_tracker.tracker import Tracker
 from hypothesis import given
 from hypothesis import strategies as st
@@ -72,15 +75,42 @@ def test_of_heads_on_one_another_the_best_is_kept():
 
 @pytest.mark.parametrize("size", [(32, 32), (240, 320), (480, 640), (640, 360)])
 def test_scales_of_a_search_are_octaves_down_to_the_smallest_picture_that_shows_a_head(size):
-    scales = search_scales(*size)
-    assert scales[0] >= 1
-    assert max(size) / scales[0] <= 320
-    assert all(b == 2 * a for a, b in pairwise(scales))
+    looks = whole_looks(*size)
+    assert looks[0].scale >= 1
+    assert max(size) / looks[0].scale <= 320
+    assert all(b.scale == 2 * a.scale for a, b in pairwise(looks))
+    assert {look.part for look in looks} == {(0, 0, size[1], size[0])}
+
+
+@pytest.mark.parametrize("size", [(480, 640), (240, 320)])
+def test_a_picture_that_is_the_frame_is_searched_whole_alone_up_to_vga(size):
+    assert close_looks(*size, 1.0, 8) == []
+
+
+@pytest.mark.parametrize(
+    ("size", "frame_scale", "scales"),
+    [((360, 640), 3.0, [1]), ((480, 640), 1.6, [1]), ((720, 1280), 1.0, [2]), ((720, 1280), 1.5, [2, 1])],
+)
+def test_parts_of_a_large_picture_are_searched_too(size, frame_scale, scales):
+    height, width = size
+    looks = close_looks(height, width, frame_scale, 8)
+    assert list(dict.fromkeys(look.scale for look in looks)) == scales
+    for scale in scales:
+        covered = np.zeros(size, np.uint8)
+        for part, _ in (look for look in looks if look.scale == scale):
+            assert max(part.w, part.h) / scale <= 321
+            covered[part.window(*size)] += 1
+        assert covered.min() == 1
+        assert (covered > 1).any()
+
+
+def test_heads_that_are_wide_enough_are_not_looked_for_closely():
+    assert close_looks(360, 640, 3.0, 40) == []
 
 
 def seen_in(finder, picture, hand):
     """The surest head, and the log odds of a hand of either side at that place."""
-    head = max((h for scale in search_scales(480, 640) for h in finder.over(picture, scale).heads(0.0)), key=lambda h: h.odds)
+    head = max((h for look in whole_looks(480, 640) for h in finder.over(picture, look).heads(0.0)), key=lambda h: h.odds)
     around = finder.around(picture, head.x, head.y, head.width)
     return head, max(around.odds_near(kind, *hand, 0.4 * head.width) for kind in (RIGHT_HAND, LEFT_HAND))
 
@@ -108,7 +138,7 @@ def test_the_mirror_changes_nothing_but_the_side(finder, pointing):
 
 def test_a_wall_has_no_head(finder):
     wall = np.full((240, 320, 3), (120, 150, 190), np.uint8)
-    assert finder.over(wall, 1.0).heads(0.0) == []
+    assert finder.over(wall, Look(Box(0, 0, 320, 240), 1.0)).heads(0.0) == []
 
 
 @pytest.mark.parametrize("place", [(5000, 100), (100, 5000), (-5000, 100), (100, -5000)])

@@ -36,7 +36,7 @@ def views_of(image):
 
 def test_a_head_that_leaves_the_picture_between_two_frames_is_let_go():
     views = views_of(np.full((480, 640, 3), 90, np.uint8))
-    heads = HeadTracks((480, 640), TrackerConfig(), Finder(), count(), count())
+    heads = HeadTracks((480, 640), 1.0, TrackerConfig(), Finder(), count(), count())
     heads.persons.append(person_at(900, 200))
     heads.update(
         views, Background(views.coarse, 20), MotionHistory(views.coarse), SkinModel(0.2), Step(PERIOD_NS, PERIOD_NS, PERIOD_NS)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from deixis_tracker.camera_motion import Matrix, Shift
 from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, repeated
+from deixis_tracker.median import median
 
 UPDATE_S = 0.1
 STEADY_RATE, CHANGED_RATE = 0.1, 0.02  # of learning, per update
@@ -73,9 +74,8 @@ class Background:
         """(H, W) uint8, 255 where the picture differs from the room under today's light. `frozen`: 255 where people are."""
         self._expected = self._under_light(image, frozen)
         difference = cv2.absdiff(image, self._expected)
-        b, g, r = cv2.split(difference)
-        largest = cv2.max(cv2.max(b, g), r)
-        changed = np.asarray(cv2.threshold(largest, self._threshold, 255, cv2.THRESH_BINARY)[1], np.uint8)
+        alike = cv2.inRange(difference, (0, 0, 0), (self._threshold,) * 3)
+        changed = np.asarray(cv2.bitwise_not(alike), np.uint8)
         return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, EDGES), np.uint8) if self._moves else changed
 
     @property
@@ -114,12 +114,14 @@ class Background:
         elif self._moves:
             self._learn(image, np.asarray(room, np.uint8), MOVING_RATE)
         elif updates:
-            self._learn(image, np.asarray(room & (changed == 0), np.uint8), repeated(STEADY_RATE, updates))
-            self._learn(image, np.asarray(room & (changed != 0), np.uint8), repeated(CHANGED_RATE, updates))
+            steady = changed == 0
+            self._learn(image, np.asarray(room & steady, np.uint8), repeated(STEADY_RATE, updates))
+            self._learn(image, np.asarray(room & ~steady, np.uint8), repeated(CHANGED_RATE, updates))
+        if self.unstable or self._moves or updates:
+            self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
     def _learn(self, image: Image, where: Mask, rate: float) -> None:
         cv2.accumulateWeighted(image, self._mean, rate, mask=where)
-        self._shown = np.asarray(cv2.convertScaleAbs(self._mean), np.uint8)
 
     def _under_light(self, image: Image, frozen: Mask) -> Image:
         """The room under today's light: one gain per channel, the median ratio over the room."""
@@ -130,18 +132,12 @@ class Background:
         gains = []
         for c in range(3):
             usable = (room[:, c] > 20) & (room[:, c] < 245) & (seen[:, c] < 245)
-            gains.append(_median(seen[usable, c] / room[usable, c]) if usable.sum() >= 20 else 1.0)
+            gains.append(float(median(seen[usable, c] / room[usable, c])) if usable.sum() >= 20 else 1.0)
         if max(abs(gain - 1) for gain in gains) < SAME_LIGHT:
             return self._shown
         levels = np.arange(256, dtype=np.float32)[:, None] * np.array(gains, np.float32)
         table = np.clip(levels, 0, 255).astype(np.uint8)[None]
         return np.asarray(cv2.LUT(self._shown, table), np.uint8)
-
-
-def _median(values: NDArray[np.float32]) -> float:
-    """That of numpy, in a third of its time."""
-    ordered = np.sort(values)
-    return float(ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1].mean())
 
 
 class MotionHistory:

@@ -13,7 +13,8 @@ class TrackerConfig(StageConfig):
         default=640,
         ge=160,
         le=1920,
-        description="Larger pictures are scaled down to this width for tracking; pixels published are of the frame.",
+        description="Larger pictures are scaled down to this length of their longer side for tracking; pixels published are of "
+        "the frame.",
     )
     max_persons: int = Field(default=4, ge=1, le=16, description="Most persons tracked at a time.")
     min_head_px: int = Field(default=8, ge=6, le=400, description="Narrowest head looked for, pixels of the working picture.")

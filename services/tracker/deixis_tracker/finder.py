@@ -10,6 +10,8 @@ OpenCV's `dnn` runs it: it comes with the OpenCV that the tracker needs anyway, 
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -19,7 +21,7 @@ from deixis_schemas.anatomy import HEAD_WIDTH_M
 from numpy.typing import NDArray
 
 from deixis_tracker.camera_motion import Shift
-from deixis_tracker.frame import Image
+from deixis_tracker.frame import Box, Image
 
 Maps = NDArray[np.float32]
 
@@ -29,6 +31,8 @@ PIXEL_MIDDLE, PIXEL_SPREAD = 115.0, 60.0
 WIDTH_PER_BREADTH = HEAD_WIDTH_M / 0.185  # width of a head, by its breadth ear to ear, which the network was fitted to
 KNOWN_PX = (6.5, 30.0)  # breadths of heads that it knows
 HEAD, RIGHT_HAND, LEFT_HAND, BREADTH = range(4)
+SEARCHED_PX, SHARED_PX = 320, 64  # longest side of what is searched at once, and how far parts of a picture overlap
+LEAST_SHRUNK = 1.5  # pixels of the frame that are made one, at least: noise fills what is finer
 LEAST_SIDE_PX = 48  # a smaller picture shows no head with what is around it
 WIDE, ABOVE, BELOW = 5.3, 3.2, 6.2  # surroundings of a head that are looked at, head widths; an arm is about 4.5 long
 NEIGHBOURS = np.ones((3, 3), np.uint8)
@@ -51,7 +55,7 @@ class Surroundings:
         """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
         self._maps = maps
         self._x0, self._y0, self._scale = x0, y0, scale
-        self._summits: dict[int, tuple[Maps, list[tuple[int, int]]]] = {}
+        self._summits: dict[int, tuple[list[float], list[tuple[int, int]]]] = {}
         self._seen: dict[tuple[int, int, int], Seen] = {}
 
     def moved(self, shift: Shift) -> Surroundings:
@@ -85,8 +89,8 @@ class Surroundings:
         # Each is worked out once, for these are asked for again and again: for each blob, and until the next look.
         if kind not in self._summits:
             self._summits[kind] = _summits(self._maps[kind])
-        odds, cells = self._summits[kind]
-        return [self._peak(kind, *cell) for cell in cells[: int(np.count_nonzero(odds >= least))]]
+        heights, cells = self._summits[kind]
+        return [self._peak(kind, *cell) for cell in cells[: bisect_right(heights, -least)]]
 
     def _peak(self, kind: int, row: int, column: int) -> Seen:
         at = kind, row, column
@@ -131,9 +135,10 @@ class Finder:
         part = picture[y0 : max(y0 + 1, min(picture.shape[0], round(bottom))), x0 : max(x0 + 1, round(right))]
         return self._looked_at(part, x0, y0, scale)
 
-    def over(self, picture: Image, scale: float) -> Surroundings:
-        """What is in a whole picture, `scale` of whose pixels are made one."""
-        return self._looked_at(picture, 0, 0, scale)
+    def over(self, picture: Image, look: Look) -> Surroundings:
+        """What is in a part of a picture, or in all of it."""
+        rows, columns = look.part.window(*picture.shape[:2])
+        return self._looked_at(picture[rows, columns], columns.start, rows.start, look.scale)
 
     def _looked_at(self, part: Image, x0: int, y0: int, scale: float) -> Surroundings:
         size = max(1, round(part.shape[1] / scale)), max(1, round(part.shape[0] / scale))
@@ -144,12 +149,42 @@ class Finder:
         return Surroundings(maps[:, : -(-size[1] // STRIDE), : -(-size[0] // STRIDE)], x0, y0, scale)
 
 
-def search_scales(height: int, width: int) -> list[float]:
-    """Scales at which a picture of that size is searched, the finest first; two are an octave apart."""
-    scales = [max(1.0, max(height, width) / 320)]
-    while min(height, width) / (2 * scales[-1]) >= LEAST_SIDE_PX:
-        scales.append(2 * scales[-1])
-    return scales
+class Look(NamedTuple):
+    """A part of a picture that is searched; `scale` of its pixels are made one."""
+
+    part: Box
+    scale: float
+
+
+def whole_looks(height: int, width: int) -> list[Look]:
+    """Looks at a whole picture of that size, the finest first; two are an octave apart."""
+    whole = Box(0, 0, width, height)
+    looks = [Look(whole, max(1.0, max(height, width) / SEARCHED_PX))]
+    while min(height, width) / (2 * looks[-1].scale) >= LEAST_SIDE_PX:
+        looks.append(Look(whole, 2 * looks[-1].scale))
+    return looks
+
+
+def close_looks(height: int, width: int, frame_scale: float, least_px: float) -> list[Look]:
+    """Looks at parts of a picture in which heads of `least_px` or more show that are too small for the whole ones.
+
+    `frame_scale` pixels of the frame are one of the picture's; what the frame itself hardly shows is not looked for. No part
+    costs more than a whole look.
+    """
+    looks: list[Look] = []
+    scale = whole_looks(height, width)[0].scale
+    while KNOWN_PX[0] * WIDTH_PER_BREADTH * scale > least_px and scale / 2 >= max(1.0, LEAST_SHRUNK / frame_scale):
+        scale /= 2
+        ends = [_parts(side, scale * SEARCHED_PX, scale * SHARED_PX) for side in (width, height)]
+        looks += [Look(Box(x, y, w, h), scale) for y, h in ends[1] for x, w in ends[0]]
+    return looks
+
+
+def _parts(side: int, most: float, shared: float) -> list[tuple[float, float]]:
+    """Start and length of parts of a side that overlap by `shared` and are not longer than `most`, all of one length."""
+    count = max(1, math.ceil((side - shared) / (most - shared)))
+    length = (side + (count - 1) * shared) / count
+    return [(k * (length - shared), length) for k in range(count)]
 
 
 def apart(heads: list[Seen]) -> list[Seen]:
@@ -162,12 +197,13 @@ def apart(heads: list[Seen]) -> list[Seen]:
     return kept
 
 
-def _summits(odds: Maps) -> tuple[Maps, list[tuple[int, int]]]:
-    """Odds and cells (row, column) of a map's local maxima, the highest first."""
+def _summits(odds: Maps) -> tuple[list[float], list[tuple[int, int]]]:
+    """Odds, their sign turned, and cells (row, column) of a map's local maxima, the highest first."""
     rows, columns = np.nonzero(odds >= cv2.dilate(odds, NEIGHBOURS))
-    order = np.argsort(-odds[rows, columns], kind="stable")
+    turned = -odds[rows, columns]
+    order = np.argsort(turned, kind="stable")
     cells = list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
-    return odds[rows[order], columns[order]], cells
+    return turned[order].tolist(), cells
 
 
 def _summit(line: Maps, k: int) -> float:

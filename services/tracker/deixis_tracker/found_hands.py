@@ -13,7 +13,8 @@ import numpy as np
 
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND, Maps, Seen
-from deixis_tracker.frame import Box, Mask, Views, around
+from deixis_tracker.frame import Box, Image, Mask, Views, around
+from deixis_tracker.median import median
 from deixis_tracker.persons import Person
 from deixis_tracker.segmentation import Blob
 
@@ -81,25 +82,27 @@ def _blob(views: Views, place: Place, config: TrackerConfig) -> Blob:
     """What has the colour of the hand's middle and hangs together with it; a disk where that is no hand's size."""
     w, hand = place.person.width, place.hand
     rows, columns = place.box.window(*views.full.shape[:2])
-    y, x = np.mgrid[rows.start : rows.stop, columns.start : columns.stop]
-    away = np.asarray(np.hypot(x - hand.x, y - hand.y) / w, np.float32)
-    mask = _about_middle(_alike(np.asarray(views.full[rows, columns], np.float32), away), away)
+    x, y = np.arange(columns.start, columns.stop) - hand.x, np.arange(rows.start, rows.stop) - hand.y
+    away = np.asarray(np.hypot(x, y[:, None]) / w, np.float32)
+    mask = _about_middle(_alike(views.full[rows, columns], away), away)
     if not config.min_hand_area * w * w <= np.count_nonzero(mask) <= MOST_AREA * w * w:
         mask = np.asarray(away <= USUAL, np.uint8)
     evidence = float(1 / (1 + np.exp(config.hand_odds - min(hand.odds, 10.0))))
     return Blob(mask, columns.start, rows.start, int(np.count_nonzero(mask)), evidence, SURE, place.person.person_id)
 
 
-def _alike(part: Maps, away: Maps) -> Mask:
-    """What has the colour of the middle, 0 or 1."""
-    middle = part[away <= MIDDLE]
-    if len(middle) < 4:
+def _alike(part: Image, away: Maps) -> Mask:
+    """What of a picture (h, w, 3) has the colour of the middle, 0 or 1."""
+    middle = away <= MIDDLE
+    if np.count_nonzero(middle) < 4:
         return np.zeros(away.shape, np.uint8)
-    mean = np.median(middle, axis=0)
-    spread = np.maximum(LEAST_SPREAD, np.median(np.abs(middle - mean), axis=0) * 1.5)
-    off = np.sqrt((((part - mean) / spread) ** 2).mean(axis=2))
-    alike = np.asarray((off <= ALIKE) & (away <= REACH), np.uint8)
-    alike[away <= MIDDLE] = 1
+    off = np.zeros(away.shape, np.float32)
+    for channel in cv2.split(part):
+        levels = channel.astype(np.float32)
+        mean = median(levels[middle])
+        spread = max(LEAST_SPREAD, float(median(np.abs(levels[middle] - mean))) * 1.5)
+        off += ((levels - mean) / np.float32(spread)) ** 2
+    alike = np.asarray(((np.sqrt(off / 3) <= ALIKE) & (away <= REACH)) | middle, np.uint8)
     return np.asarray(cv2.medianBlur(alike, 3), np.uint8)
 
 

@@ -87,9 +87,15 @@ class Box(NamedTuple):
 
     def window(self, height: int, width: int) -> tuple[slice, slice]:
         """Rows and columns of the part inside a picture; empty slices when it lies outside."""
-        x0, y0 = (min(max(0, int(v)), limit) for v, limit in ((self.x, width), (self.y, height)))
-        x1, y1 = (min(max(0, round(v)), limit) for v, limit in ((self.x + self.w, width), (self.y + self.h, height)))
-        return slice(y0, max(y0, y1)), slice(x0, max(x0, x1))
+        x0, x1 = _inside(self.x, self.x + self.w, width)
+        y0, y1 = _inside(self.y, self.y + self.h, height)
+        return slice(y0, y1), slice(x0, x1)
+
+
+def _inside(start: float, end: float, limit: int) -> tuple[int, int]:
+    first, last = int(start), round(end)
+    first = 0 if first < 0 else min(first, limit)
+    return first, first if last < first else min(last, limit)
 
 
 def around(x: float, y: float, left: float, top: float, right: float, bottom: float) -> Box:

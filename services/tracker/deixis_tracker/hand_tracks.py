@@ -32,6 +32,7 @@ ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
 LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
 Claim = tuple[Person, HandTrack]
+Odds = tuple[float, float]  # of a right and of a left hand
 
 
 class HandTracks:
@@ -66,7 +67,8 @@ class HandTracks:
             self._settle(person, step)
 
     def _density(self, person: Person, hand: HandTrack) -> Density:
-        dx, dy = hand.motion.x - hand.pixels[:, 0].mean(), hand.motion.y - hand.pixels[:, 1].mean()
+        x, y = hand.last_seen
+        dx, dy = hand.motion.x - x, hand.motion.y - y
         return propagate(hand.pixels, dx, dy, min(hand.motion.sigma_px, 0.6 * person.width), *self._size)
 
     def _split(self, blob: Blob, cells: Cells, claims: list[Claim], densities: list[Density]) -> list[tuple[Claim, Blob]]:
@@ -133,18 +135,17 @@ class HandTracks:
         if hand is None or math.dist(hand.centroid, track.last_seen) > _reach_px(person, track, step):
             return False
         track.motion.correct(*hand.centroid, 0.06 * person.width)
-        self._take_in(person, track, hand, blob, step)
-        track.belief.update(_features(person, track, hand, blob, self._config.hand_odds), step.passed_s)
+        odds = _odds(person, hand, self._config.hand_odds)
+        self._take_in(person, track, hand, blob, odds, step)
+        track.belief.update(_features(person, track, hand, blob, odds), step.passed_s)
         return True
 
-    def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, step: Step) -> None:
+    def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, odds: Odds, step: Step) -> None:
         track.pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
         track.blob, track.seen_ns = hand, step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
-        track.evidence = max(
-            step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(_odds(person, hand, self._config.hand_odds)))
-        )
+        track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
 
     def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
         """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
@@ -154,15 +155,15 @@ class HandTracks:
         hand = self._cut(person, blob, None, x, step.now_ns)
         if hand is None or person.distance(*hand.centroid) > self._config.reach:
             return
-        track = _lost_hand(person, hand, step)
+        track, odds = _lost_hand(person, hand, step), _odds(person, hand, self._config.hand_odds)
         if track is not None:  # a blurred hand is lost for some frames, and comes to rest somewhere else
             track.motion.restart(*hand.centroid, 0.1 * person.width)
-            self._take_in(person, track, hand, blob, step)
+            self._take_in(person, track, hand, blob, odds, step)
         elif len(person.hands) < MOST_HANDS:
             motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
             track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
-            track.belief.update(_features(person, track, hand, blob, self._config.hand_odds), 1.0)
+            track.belief.update(_features(person, track, hand, blob, odds), 1.0)
             person.hands.append(track)
 
     def _settle(self, person: Person, step: Step) -> None:
@@ -212,15 +213,15 @@ def _one_per_arm(claims: list[int], tracks: list[Claim]) -> list[int]:
     return sorted(kept.values())
 
 
-def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob, doubtful: float) -> Features:
+def _features(person: Person, track: HandTrack, hand: Hand, blob: Blob, odds: Odds) -> Features:
     w = person.width
     speed = math.hypot(track.motion.vx, track.motion.vy) / w
     dx, dy = (track.motion.x - person.x) / w, (track.motion.y - person.y) / w
-    right, left = _odds(person, hand, doubtful)
-    return Features(dx, dy, speed, hand.area / w**2, max(blob.evidence, _share(max(right, left))), blob.sure, right, left)
+    evidence = max(blob.evidence, _share(max(odds)))
+    return Features(dx, dy, speed, hand.area / w**2, evidence, blob.sure, *odds)
 
 
-def _odds(person: Person, hand: Hand, doubtful: float) -> tuple[float, float]:
+def _odds(person: Person, hand: Hand, doubtful: float) -> Odds:
     """The finder's log odds of a right and of a left hand there, beyond `doubtful` ones; 0 where it has not looked."""
     if person.around is None:
         return 0.0, 0.0

@@ -1,6 +1,7 @@
 """Looks for heads that nobody follows yet: the whole picture, a scale at a time, and again at places where one may be.
 
-A single look can be wrong, so the log odds of several looks are added up before a head is believed.
+Of frames larger than VGA, parts are looked at in turn with the whole, in which far people are too small; it is still one
+look at a time. A single look can be wrong, so the log odds of several looks are added up before a head is believed.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from deixis_tracker.background import MotionHistory
 from deixis_tracker.camera_motion import Shift
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import look
-from deixis_tracker.finder import Finder, apart, search_scales
+from deixis_tracker.finder import Finder, Look, apart, close_looks, whole_looks
 from deixis_tracker.frame import COARSE, Step, Views, around
 from deixis_tracker.persons import Person
 from deixis_tracker.sway import Glimpse
 
-SEARCH_S = 0.5  # all scales, once somebody is tracked
-SCALE_S = 1 / 30  # one scale, before
+SEARCH_S = 0.5  # as many looks as show the whole picture at all scales, once somebody is tracked
+SCALE_S = 1 / 30  # one look, before
 LEAST_ODDS = 0.8  # of a place that is looked at again
 DOUBTFUL = 1.0  # log odds that speak neither for a head nor against it: those of things that pass for one
 MOST_FOR, MOST_AGAINST = 1.0, 2.0  # that one look adds: looks in a row are wrong together
@@ -56,27 +57,28 @@ class Candidate:
 class HeadSearch:
     """The search of one camera's pictures, all of one size."""
 
-    def __init__(self, height: int, width: int, config: TrackerConfig, finder: Finder) -> None:
-        """For working pictures of `height` and `width`."""
+    def __init__(self, height: int, width: int, frame_scale: float, config: TrackerConfig, finder: Finder) -> None:
+        """For working pictures of `height` and `width`, of whose pixels one is `frame_scale` of the frame's."""
         self._config = config
         self._finder = finder
-        self._scales = search_scales(height, width)
+        self._wholes = whole_looks(height, width)
+        self._looks = self._wholes + close_looks(height, width, frame_scale, config.min_head_px)
         self._next = 0
         self._begun = False
         self.candidates: list[Candidate] = []
 
     def search(self, views: Views, tracked: int, step: Step) -> None:
-        """Search at the scales that are due; `tracked`: number of heads known. New places become candidates."""
-        period_s = SEARCH_S / len(self._scales) if tracked else SCALE_S
-        due = min(step.periods(period_s), len(self._scales)) if self._begun else len(self._scales)
+        """Take the looks that are due; `tracked`: number of heads known. New places become candidates."""
+        period_s = SEARCH_S / len(self._wholes) if tracked else SCALE_S
+        due = min(step.periods(period_s), len(self._wholes)) if self._begun else len(self._wholes)
         self._begun = True
         for _ in range(due):
-            self._search_at(self._scales[self._next], views, step)
-            self._next = (self._next + 1) % len(self._scales)
+            self._take(self._looks[self._next], views, step)
+            self._next = (self._next + 1) % len(self._looks)
 
-    def _search_at(self, scale: float, views: Views, step: Step) -> None:
+    def _take(self, look: Look, views: Views, step: Step) -> None:
         largest = self._config.max_head_share * views.full.shape[0]
-        for seen in apart(self._finder.over(views.full, scale).heads(LEAST_ODDS)):
+        for seen in apart(self._finder.over(views.full, look).heads(LEAST_ODDS)):
             new = not any(known.is_near(seen.x, seen.y, NEAR) for known in self.candidates)
             if new and self._config.min_head_px <= seen.width <= largest:
                 self.candidates.append(Candidate(seen.x, seen.y, seen.width, worth(seen.odds), step.now_ns))

@@ -50,16 +50,22 @@ class HeadTracks:
     """The persons in view, by their heads."""
 
     def __init__(
-        self, size: tuple[int, int], config: TrackerConfig, finder: Finder, person_ids: Iterator[int], ids: Iterator[int]
+        self,
+        size: tuple[int, int],
+        frame_scale: float,
+        config: TrackerConfig,
+        finder: Finder,
+        person_ids: Iterator[int],
+        ids: Iterator[int],
     ) -> None:
-        """For working pictures of `size` (height, width); `ids` number the tracks."""
+        """For working pictures of `size` (height, width); a pixel is `frame_scale` of the frame's. `ids` number the tracks."""
         self.persons: list[Person] = []
         self.left_out = 0  # faces found and not followed in this frame, for there are `max_persons` already
         self._size = size
         self._config = config
         self._person_ids, self._ids = person_ids, ids
         self._shapes = finder
-        self._search = HeadSearch(*size, config, finder)
+        self._search = HeadSearch(*size, frame_scale, config, finder)
         self._colours = HeadFinder()
 
     def update(self, views: Views, room: Background, motion: MotionHistory, skin: SkinModel, step: Step) -> None:
@@ -137,6 +143,7 @@ class HeadTracks:
         """Correct a head by its frontal face, where that is to be seen. `covered`: a hand is before it."""
         seen = _look(person, views)
         if seen is None:
+            person.no_face_ns = step.now_ns
             return
         if not covered:
             if person.sightings and step.now_ns - person.face_ns > AWAY_S * 1e9:
@@ -193,7 +200,8 @@ class HeadTracks:
         """Measure the frontal faces that are due in this frame: one, that its time stays bounded, the least known first."""
         for person in self.persons:
             person.frontal = None
-        for person in sorted((p for p in self.persons if _measuring_is_due(p, step)), key=lambda p: p.measured):
+        due = [p for p in self.persons if p.no_face_ns != step.now_ns and _measuring_is_due(p, step)]
+        for person in sorted(due, key=lambda p: p.measured):
             seen = _look(person, views)
             if seen is not None:
                 in_frame = Box(*to_frame(seen.x, seen.y, views.scale), seen.w * views.scale, seen.h * views.scale)

@@ -100,6 +100,8 @@ class HeadFinder:
     def __init__(self) -> None:
         inside, around = ellipse_kernels()
         self._kernel = inside - around
+        self._offsets = _grid(round((1 + SEARCH) * CELLS_PER_WIDTH) - CELLS_PER_WIDTH, CELLS_PER_WIDTH)
+        self._away = self._offsets[0] ** 2 + self._offsets[1] ** 2
 
     def find(self, image: Image, colours: HeadColours, x: float, y: float, width: float, tightness: float) -> HeadFound:
         """The head near the prediction (x, y). `tightness`: penalty on leaving it by one head width, in units of support."""
@@ -118,8 +120,8 @@ class HeadFinder:
         matrix[:, 2] += scale * np.array([columns.start, rows.start])
         small = cv2.warpAffine(colours.map(part), matrix, (side, side), flags=cv2.INTER_LINEAR, borderValue=0.5)
         contrast = np.asarray(cv2.matchTemplate(small, self._kernel, cv2.TM_CCORR), np.float32)
-        gx, gy = _grid(contrast.shape[0] // 2, CELLS_PER_WIDTH)
-        score = contrast - np.float32(tightness) * (gx**2 + gy**2)
+        gx, gy = self._offsets
+        score = contrast - np.float32(tightness) * self._away
         row, column = np.unravel_index(int(np.argmax(score)), score.shape)
         dx = float(gx[row, column]) + _parabola(score[row], int(column)) / CELLS_PER_WIDTH
         dy = float(gy[row, column]) + _parabola(score[:, column], int(row)) / CELLS_PER_WIDTH

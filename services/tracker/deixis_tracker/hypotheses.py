@@ -60,22 +60,24 @@ def sample_pixels(mask: NDArray[np.uint8], x0: int, y0: int) -> Points:
 
 def propagate(pixels: Points, dx: float, dy: float, sigma_px: float, height: int, width: int) -> Density:
     """Density of `pixels` moved by (dx, dy) and spread by `sigma_px`, per cell of CELL x CELL pixels; its sum is 1."""
-    cells = ((pixels + np.array([dx, dy], np.float32)) / CELL).astype(np.int64)
-    most = np.array([width // CELL, height // CELL])
-    cells = cells[np.all((cells >= 0) & (cells <= most), axis=1)]
-    if not len(cells):
+    x, y = (((pixels[:, k] + np.float32(by)) / CELL).astype(np.int64) for k, by in enumerate((dx, dy)))
+    last_x, last_y = width // CELL, height // CELL
+    inside = (x >= 0) & (x <= last_x) & (y >= 0) & (y <= last_y)
+    x, y = x[inside], y[inside]
+    if not len(x):
         return Density(np.zeros((0, 0), np.float32), 0, 0)
     half = round(1.2 * min(max(0.7, sigma_px / CELL), 20.0))
     # Only as far as they spread.
-    (left, top), (right, bottom) = np.maximum(cells.min(axis=0) - 2 * half, 0), np.minimum(cells.max(axis=0) + 2 * half, most)
-    rows, columns = int(bottom - top) + 1, int(right - left) + 1
-    flat = (cells[:, 1] - top) * columns + cells[:, 0] - left
+    left, right = max(0, int(x.min()) - 2 * half), min(last_x, int(x.max()) + 2 * half)
+    top, bottom = max(0, int(y.min()) - 2 * half), min(last_y, int(y.max()) + 2 * half)
+    rows, columns = bottom - top + 1, right - left + 1
+    flat = (y - top) * columns + x - left
     shares = np.bincount(flat, minlength=rows * columns).reshape(rows, columns).astype(np.float32) / max(1, len(pixels))
     # Two boxes are nearly a Gaussian, and cost the same at any width.
     side = 2 * half + 1
     once = cv2.blur(shares, (side, side), borderType=cv2.BORDER_CONSTANT)
     spread = np.asarray(cv2.blur(once, (side, side), borderType=cv2.BORDER_CONSTANT), np.float32)
-    return Density(spread, int(top), int(left))
+    return Density(spread, top, left)
 
 
 def cells_of(mask: NDArray[np.uint8], x0: int, y0: int) -> Cells:

@@ -48,12 +48,17 @@ class HandTrack:
     watched_s: float = 0.0  # time in which it was seen
     as_seen_ns: int = -(10**18)  # when the hand was cut out last where the finder saw it
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
+    _middle: tuple[Points | None, tuple[float, float]] = field(default=(None, (0.0, 0.0)), repr=False, compare=False)
 
     @property
     def last_seen(self) -> tuple[float, float]:
         """Middle of the pixels seen last."""
-        x, y = self.pixels.mean(axis=0)
-        return float(x), float(y)
+        pixels, middle = self._middle
+        if pixels is not self.pixels:  # they are replaced, never changed; and this is asked for again and again
+            x, y = self.pixels.mean(axis=0)
+            middle = float(x), float(y)
+            self._middle = self.pixels, middle
+        return middle
 
 
 @dataclass
@@ -68,6 +73,7 @@ class Person:
     since_ns: int
     seen_ns: int
     face_ns: int = -(10**18)  # when its face was seen from the front and uncovered last
+    no_face_ns: int = -(10**18)  # when it was looked for there last and not seen
     back_ns: int = -(10**18)  # when it was seen so again, after it was turned away or covered
     support: float = 1.0
     observed: bool = True

@@ -59,8 +59,7 @@ def hand_blobs(
     allowed = cv2.bitwise_or(foreground, np.asarray(certain, np.uint8))
     heads = head_zone((skin.shape[0], skin.shape[1]), persons, 0.0)
     near_head = head_zone((skin.shape[0], skin.shape[1]), persons, FACE_RIM)
-    allowed[heads > 0] = 0
-    probability = np.asarray(cv2.bitwise_and(skin, allowed), np.uint8)
+    probability = np.asarray(cv2.bitwise_and(skin, cv2.subtract(allowed, heads)), np.uint8)
     least = 0.8 * config.min_hand_area * min(p.width for p in persons) ** 2 * COARSE**2
     labels, stats, kept = hysteresis(probability, config.skin_low, config.skin_high, max(4, int(least)))
     blobs = []
@@ -97,14 +96,17 @@ def _is_ghost(mask: Mask, x: int, y: int, coarse: Image, room: Image) -> bool:
     h, w = mask.shape
     x0, y0 = max(0, x - 1), max(0, y - 1)
     window = np.s_[y0 : y + h + 1, x0 : x + w + 1]
-    part = cv2.cvtColor(coarse[window], cv2.COLOR_BGR2GRAY)
-    padded = np.zeros(part.shape, np.uint8)
+    padded = np.zeros(room[window].shape[:2], np.uint8)
     padded[y - y0 : y - y0 + h, x - x0 : x - x0 + w] = mask
     rim = np.asarray(cv2.morphologyEx(padded, cv2.MORPH_GRADIENT, EDGE), np.uint8)
-    seen = cv2.mean(cv2.morphologyEx(part, cv2.MORPH_GRADIENT, EDGE), rim)[0]
-    remembered = cv2.cvtColor(room[window], cv2.COLOR_BGR2GRAY)
-    known = cv2.mean(cv2.morphologyEx(remembered, cv2.MORPH_GRADIENT, EDGE), rim)[0]
-    return known > GHOST_EDGE and seen < GHOST * known
+    known = _edges(room[window], rim)
+    return known > GHOST_EDGE and _edges(coarse[window], rim) < GHOST * known
+
+
+def _edges(part: Image, rim: Mask) -> float:
+    """How much the grey levels of a picture (h, w, 3) change, in the mean over a rim."""
+    grey = cv2.cvtColor(part, cv2.COLOR_BGR2GRAY)
+    return float(cv2.mean(cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, EDGE), rim)[0])
 
 
 def _evidence(mask: Mask, x: int, y: int, foreground: Mask, motion: MotionHistory) -> float:

@@ -75,14 +75,14 @@ class Tracker:
         if moment.new_run or self._shape != (height, width):
             self._shape = height, width
             self._began_ns = moment.now_ns - FIRST_NS
-            self._reset(work)
+            self._reset(work, 1 / scale)
         run_ns = moment.now_ns - self._began_ns
         passed_ns = min(LONGEST_STEP_NS, round(moment.elapsed_s * 1e9) or run_ns)
         self._step(image, work, 1 / scale, Step(moment.now_ns, run_ns, passed_ns))
         self.room_offset_px = self._camera.offset[0] / scale, self._camera.offset[1] / scale
         return [track for person in self._heads.persons for track in tracks_of(person, moment.now_ns, 1 / scale)]
 
-    def _reset(self, work: Image) -> None:
+    def _reset(self, work: Image, scale: float) -> None:
         size = work.shape[0], work.shape[1]
         coarse = coarsened(work)
         self.is_grey = is_grey(coarse)
@@ -90,7 +90,7 @@ class Tracker:
         self._room = Background(coarse, self._config.change_threshold)
         self._motion = MotionHistory(coarse)
         self._skin = SkinModel(self._config.prior_skin)
-        self._heads = HeadTracks(size, self._config, self._finder, self._person_ids, self._track_ids)
+        self._heads = HeadTracks(size, scale, self._config, self._finder, self._person_ids, self._track_ids)
         self._hands = HandTracks(size, self._config, self._track_ids)
         self._people: Mask = np.zeros(coarse.shape[:2], np.uint8)
 
