@@ -1,4 +1,4 @@
-"""Where fingertips are and heads turn when people point: any person, any style and any direction, without a picture.
+"""Where fingertips are when people point: arms of any person, any style and any direction, without a picture.
 
 To fit what a camera can tell of a pointing's direction. Directions are drawn evenly all around, so that how often a fingertip
 is somewhere says how likely the direction makes it.
@@ -32,14 +32,13 @@ POI_DISTANCE_M, POI_HEIGHT_M = (0.8, 4.0), (0.3, 2.3)
 class PointingArm:
     """A pointing that stands. bearing_deg: of the POI at the head, from the direction to the camera, positive toward the
     person's left; elevation_deg: of the POI, above the head; tip (3,): of the index finger from the head's middle, in widths
-    of the person's own face: toward the image's right, up, and level toward the camera. yaw_deg: of the head, as the bearing.
+    of the person's own face: toward the image's right, up, and level toward the camera.
     """
 
     bearing_deg: float
     elevation_deg: float
     side: ArmSide
     tip: Floats
-    yaw_deg: float
 
 
 def pointing_arms(seed: int, avatars: Sequence[str], count: int) -> Iterator[PointingArm]:
@@ -88,6 +87,4 @@ def _seen(actor: Actor, side: ArmSide, time_s: float, scene: Scene) -> PointingA
     level = float(np.hypot(poi @ right, poi @ toward))
     axes = np.stack([right, UP, toward])
     tip = axes @ (moment.fingertip[side] - head) / (FACE_WIDTH_M * actor.body.head_scale)
-    ahead = moment.head_rotation @ np.array([0.0, 0.0, 1.0])
-    yaw = float(np.degrees(np.arctan2(ahead @ right, ahead @ toward)))
-    return PointingArm(bearing, float(np.degrees(np.arctan2(poi @ UP, level))), side, tip, yaw)
+    return PointingArm(bearing, float(np.degrees(np.arctan2(poi @ UP, level))), side, tip)

@@ -37,7 +37,7 @@ class GestureConfig(StageConfig):
         default=1.0, ge=0, le=6, description="A hand that came up so far from where it rested is raised, though lower, fw."
     )
     lowest_raised: float = Field(
-        default=3.6, ge=0, le=6, description="But none that is lower than this below the face: there hands hang, fw."
+        default=4.0, ge=0, le=6, description="But none that is lower than this below the face: there hands hang, fw."
     )
     beside_body: float = Field(
         default=2.3, ge=0, le=6, description="Sideways from the face's centre, a hand is off the body, fw."
