@@ -33,7 +33,7 @@ NO_ARM = 0.005
 """Likelihood, beside the largest, of what no arm does."""
 LEAST_SIGMA_DEG = 8.0
 # Visible length of the index finger against the bearing (foreshortened in front, hidden by the fist behind), and radius of the
-# fist (larger toward the camera). Eased from hands of the rendered clips; they say little: trackers lose fingers at any bearing.
+# fist (larger toward the camera). Eased from hands of the rendered clips; they say little: fingers are lost at any bearing.
 SHAPE_BEARINGS = np.array([0.0, 20.0, 40.0, 80.0, 100.0, 115.0, 135.0, 180.0])
 FINGER_LENGTHS = np.array([0.08, 0.28, 0.52, 0.56, 0.34, 0.24, 0.08, 0.0])
 FINGER_SIGMA = 0.11
@@ -41,7 +41,8 @@ PALM_RADII = np.array([0.33, 0.31, 0.27, 0.24, 0.24, 0.23, 0.20, 0.19])
 PALM_SIGMA = 0.05
 OUTLIERS = 0.3
 """Share of hands whose finger and palm tell nothing. By `fitting/choose_outliers.py` more would be better (3.80 nats at .15, 3.66
-at .3, 3.51 at .7): at a distance the tracker loses fingers at any bearing. On the labelled clips less would (2.77, 2.76, 2.80)."""
+at .3, 3.51 at .7): far away the tracker loses fingers at any bearing. On the labelled clips less would: 2.77, 2.76, 2.80.
+"""
 
 
 @dataclass(frozen=True)
