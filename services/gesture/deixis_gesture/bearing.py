@@ -40,8 +40,8 @@ FINGER_SIGMA = 0.11
 PALM_RADII = np.array([0.33, 0.31, 0.27, 0.24, 0.24, 0.23, 0.20, 0.19])
 PALM_SIGMA = 0.05
 OUTLIERS = 0.3
-"""Share of hands whose finger and palm tell nothing. By `fitting/choose_outliers.py` more would be better (3.80 nats at .15, 3.66
-at .3, 3.51 at .7): far away the tracker loses fingers at any bearing. On the labelled clips less would: 2.77, 2.76, 2.80.
+"""Share of hands whose finger and palm tell nothing. By `fitting/choose_outliers.py` more would be better (3.80 nats at .15,
+3.66 at .3, 3.51 at .7): far away the tracker loses fingers at any bearing. On the labelled clips less would: 2.77, 2.76, 2.80.
 """
 
 
