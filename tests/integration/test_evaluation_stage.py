@@ -1,4 +1,4 @@
-"""`deixis eval --stage headpose` as a command, on a short clip that ships."""
+"""`deixis eval --stage STAGE` as a command, on short clips that ship."""
 
 import json
 import subprocess
@@ -60,10 +60,29 @@ def test_a_clip_that_cannot_be_read_is_told_and_the_others_are_scored(tmp_path: 
     assert summary["heads"]["frames"] == 63
 
 
+def test_gestures_and_fusion_are_scored_alone_and_a_table_with_an_empty_region_is_refused(tmp_path: Path, clips: Path) -> None:
+    scores = {stage: tmp_path / f"{stage}.json" for stage in ("gesture", "fusion")}
+    one = (clips, "--only-clips", "pointing")
+    done = evaluate("--stage", "gesture", *one, "--json", scores["gesture"], "--confusion", tmp_path / "table.json")
+    assert done.returncode == 1
+    assert "no pointing was recognised to the left or center" in done.stderr
+    (stroke,) = json.loads(scores["gesture"].read_text())["clips"]["pointing"]["strokes"]
+    assert stroke["said"] == "point_right"
+    assert stroke["probability"] > 0.8
+    done = evaluate("--stage", "fusion", *one, "--json", scores["fusion"])
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(scores["fusion"].read_text())["summary"]
+    assert summary["outcomes"]["as they are"] == {"named": 1}
+    assert summary["named_at_gap"]["30"]["of"] == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "named"),
     [
-        (("--stage", "gesture"), 2, "'gesture' cannot be scored alone; known: headpose"),
+        (("--stage", "camera"), 2, "'camera' cannot be scored alone; known: headpose"),
+        (("--stage", "gesture", "--truth", "headpose"), 1, "the truth can stand for tracker alone"),
+        (("--stage", "fusion", "--set", "gesture.rules=paper"), 1, "only fusion can be set"),
+        (("--stage", "fusion", "--confusion", "t.json"), 1, "goes with --stage gesture"),
         (("--stage", "nose"), 2, "'nose' cannot be scored alone; known: headpose"),
         (("--stage", "headpose", "--truth", "gesture"), 1, "the truth can stand for tracker alone"),
         (("--stage", "headpose", "--set", "fusion.x=1"), 1, "only tracker and headpose are played"),
