@@ -18,7 +18,7 @@ from deixis_evaluation.clips import Clip
 from deixis_evaluation.episode_scores import strokes_of
 from deixis_evaluation.gesture_play import GestureSetup, play_gestures
 from deixis_gesture import bearing, person
-from deixis_gesture.bearing import BEARINGS, Bearing, Floats, HandSight, TipSight, estimate_bearing
+from deixis_gesture.bearing import BEARINGS, ArmSight, Bearing, Floats, estimate_bearing
 from deixis_schemas.messages import Side
 from rich.console import Console
 
@@ -26,7 +26,7 @@ TRIED = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
 LEAST_FRAMES = 5
 BLUR_DEG, NONSENSE = 6.0, 0.15
 """As fusion reads bearings (`hand.sigma_floor_deg`, `hand.outlier`)."""
-Asked = tuple[HandSight, TipSight, Side | None]
+Asked = tuple[ArmSight, Side | None]
 
 
 def main() -> int:
@@ -48,9 +48,9 @@ def asked_in(clip: Clip) -> list[tuple[float, list[Asked]]]:
     """Of each stroke that is recognised: the true bearing, and what the bearing was asked of, frame by frame."""
     asked: list[Asked] = []
 
-    def listen(sight: HandSight, tip: TipSight, side: Side | None) -> Bearing:
-        asked.append((sight, tip, side))
-        return estimate_bearing(sight, tip, side)
+    def listen(seen: ArmSight, side: Side | None) -> Bearing:
+        asked.append((seen, side))
+        return estimate_bearing(seen, side)
 
     of_frame: dict[int, list[Asked]] = {}
 

@@ -19,14 +19,13 @@ from pathlib import Path
 import numpy as np
 from deixis_gesture.bearing import (
     BEARINGS,
-    FINGER_LENGTHS,
-    FINGER_SIGMA,
+    EXTENT_SIGMA,
     PALM_RADII,
     PALM_SIGMA,
     SHAPE_BEARINGS,
+    ArmSight,
     Bearing,
-    HandSight,
-    TipSight,
+    Ray,
     estimate_bearing,
 )
 
@@ -48,23 +47,25 @@ def main() -> int:
     if given.check:
         check(*drawn([(seed, False) for seed in CHECKED_SEEDS]))
         return 0
-    bearings, left, tips = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
-    np.savez_compressed(given.out, bearings_deg=bearings.astype(np.float16), left=left, tips=tips.astype(np.float16))
+    bearings, left, tips, fists = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
+    bearings, tips, fists = (values.astype(np.float16) for values in (bearings, tips, fists))
+    np.savez_compressed(given.out, bearings_deg=bearings, left=left, tips=tips, fists=fists)
     return 0
 
 
-def drawn(parts: list[tuple[int, bool]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bearings (n,) in degrees, whether it is the left arm (n,), and tips (n, 3) of these seeds' arms."""
+def drawn(parts: list[tuple[int, bool]]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Bearings (n,) in degrees, whether it is the left arm (n,), tips and fists (n, 3) of these seeds' arms."""
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        bearings, left, tips = zip(*pool.map(_part, parts), strict=True)
-    return np.concatenate(bearings), np.concatenate(left), np.concatenate(tips)
+        bearings, left, tips, fists = zip(*pool.map(_part, parts), strict=True)
+    return np.concatenate(bearings), np.concatenate(left), np.concatenate(tips), np.concatenate(fists)
 
 
-def check(bearings: np.ndarray, left: np.ndarray, tips: np.ndarray) -> None:
+def check(bearings: np.ndarray, left: np.ndarray, tips: np.ndarray, fists: np.ndarray) -> None:
     """Say how well these arms are read."""
     rng, errors, inside = np.random.default_rng(0), [], []
-    for bearing, is_left, tip in zip(bearings, left, tips, strict=True):
-        told = np.array(_read(bearing, is_left, tip + rng.normal(0, MISSED, 3) * (1, 1, 0), rng).likelihood)
+    for bearing, is_left, tip, fist in zip(bearings, left, tips, fists, strict=True):
+        missed = rng.normal(0, MISSED, 3) * (1, 1, 0)
+        told = np.array(_read(bearing, is_left, (tip + missed, fist + missed), rng).likelihood)
         order = np.argsort(-told)
         place = int(np.nonzero(order == int(np.argmin(np.abs(_wrapped(BEARINGS - bearing)))))[0][0])
         inside.append(float(told[order][:place].sum() / told.sum()))
@@ -73,23 +74,29 @@ def check(bearings: np.ndarray, left: np.ndarray, tips: np.ndarray) -> None:
     print(", ".join(f"{level:.0%} hold {np.mean(np.array(inside) < level):.0%}" for level in (0.68, 0.95)))
 
 
-def _read(bearing: float, is_left: bool, tip: np.ndarray, rng: np.random.Generator) -> Bearing:
+def _read(bearing: float, is_left: bool, places: tuple[np.ndarray, np.ndarray], rng: np.random.Generator) -> Bearing:
     """What the stage makes of an arm whose person's distance is measured as badly as its hand."""
-    right, up, toward = tip
     distance, height = rng.uniform(*DISTANCES), rng.uniform(-1, 4)
     measured = distance * np.exp(rng.normal(0, DISTANCE_MISSED))
+    tip, fist = (_ray(place, distance, height) for place in places)
+    finger = rng.normal(0, EXTENT_SIGMA / measured, 2)
+    fist = Ray(fist.aside + finger[0], fist.slope + finger[1])
+    radius = np.interp(abs(bearing), SHAPE_BEARINGS, PALM_RADII) + rng.normal(0, PALM_SIGMA)
+    seen = ArmSight(tip, fist, radius, measured, height * measured / distance)
+    return estimate_bearing(seen, "left" if is_left else "right")
+
+
+def _ray(place: np.ndarray, distance: float, height: float) -> Ray:
+    right, up, toward = place
     ahead = distance - toward
-    seen = TipSight(right / ahead, (height + up) / np.hypot(ahead, right), measured, height * measured / distance)
-    finger = max(0.0, np.interp(abs(bearing), SHAPE_BEARINGS, FINGER_LENGTHS) + rng.normal(0, FINGER_SIGMA))
-    palm = np.interp(abs(bearing), SHAPE_BEARINGS, PALM_RADII) + rng.normal(0, PALM_SIGMA)
-    return estimate_bearing(HandSight(0.0, 0.0, finger, palm), seen, "left" if is_left else "right")
+    return Ray(right / ahead, (height + up) / np.hypot(ahead, right))
 
 
 def _wrapped(degrees: np.ndarray) -> np.ndarray:
     return (degrees + 180) % 360 - 180
 
 
-def _part(job: tuple[int, bool]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _part(job: tuple[int, bool]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     from deixis_simulation.avatars import FITTING_AVATARS, HELD_OUT_AVATARS  # noqa: PLC0415 (in the process that draws)
     from deixis_simulation.pointing_arms import pointing_arms  # noqa: PLC0415
 
@@ -100,6 +107,7 @@ def _part(job: tuple[int, bool]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         np.array([arm.bearing_deg for arm in arms]),
         np.array([arm.side == "left" for arm in arms]),
         np.array([arm.tip for arm in arms]),
+        np.array([arm.fist for arm in arms]),
     )
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from deixis_schemas.anatomy import FACE_WIDTH_M
 
-from .actor import Actor
+from .actor import Actor, Moment
+from .avatars import BONE_PREFIX
 from .bearings import heading_to, place_at
 from .dice import Dice
 from .draw_actions import SHORTEST_HOLD_S, Target, draw_pointing
@@ -25,20 +26,23 @@ from .scene import ArmSide, Camera, Person, Scene, ScenePoi
 
 CAMERA_HEIGHT_M = (0.9, 1.5)
 DISTANCE_M = (1.1, 3.5)
+FIST_SHARE = 0.75
+"""Of the way from the wrist to the knuckles; the fingers are bent before the palm."""
 POI_DISTANCE_M, POI_HEIGHT_M = (0.8, 4.0), (0.3, 2.3)
 
 
 @dataclass(frozen=True)
 class PointingArm:
     """A pointing that stands. bearing_deg: of the POI at the head, from the direction to the camera, positive toward the
-    person's left; elevation_deg: of the POI, above the head; tip (3,): of the index finger from the head's middle, in widths
-    of the person's own face: toward the image's right, up, and level toward the camera.
+    person's left; elevation_deg: of the POI, above the head; tip, fist (3,): of the index finger and the middle of the fist,
+    from the head's middle, in widths of the person's own face: toward the image's right, up, and level toward the camera.
     """
 
     bearing_deg: float
     elevation_deg: float
     side: ArmSide
     tip: Floats
+    fist: Floats
 
 
 def pointing_arms(seed: int, avatars: Sequence[str], count: int) -> Iterator[PointingArm]:
@@ -86,5 +90,12 @@ def _seen(actor: Actor, side: ArmSide, time_s: float, scene: Scene) -> PointingA
     bearing = float(np.degrees(np.arctan2(poi @ right, poi @ toward)))
     level = float(np.hypot(poi @ right, poi @ toward))
     axes = np.stack([right, UP, toward])
-    tip = axes @ (moment.fingertip[side] - head) / (FACE_WIDTH_M * actor.body.head_scale)
-    return PointingArm(bearing, float(np.degrees(np.arctan2(poi @ UP, level))), side, tip)
+    face_width = FACE_WIDTH_M * actor.body.head_scale
+    tip, fist = (axes @ (place - head) / face_width for place in (moment.fingertip[side], _fist(moment, side)))
+    return PointingArm(bearing, float(np.degrees(np.arctan2(poi @ UP, level))), side, tip, fist)
+
+
+def _fist(moment: Moment, side: ArmSide) -> Floats:
+    """Middle of the fist."""
+    knuckle = moment.skeleton.position(f"{BONE_PREFIX[side]}HandMiddle1")
+    return np.asarray(moment.wrist[side] + FIST_SHARE * (knuckle - moment.wrist[side]))

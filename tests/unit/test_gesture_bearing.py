@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from deixis_gesture import bearing
-from deixis_gesture.bearing import BEARINGS, HandSight, TipSight, arms_likelihood, estimate_bearing
+from deixis_gesture.bearing import BEARINGS, ArmSight, HandSight, Ray, arms_likelihood, estimate_bearing
 from deixis_gesture.hand import Face
 from deixis_gesture.person import HEAD_ABOVE_FACE, View
 from deixis_runtime.lens import Lens
@@ -16,14 +16,18 @@ from hypothesis import strategies as st
 
 LENS = Lens.assumed(640, 480, 60.0)
 DISTANCE = 11.0
-PLAIN = HandSight(0.0, 0.0, 0.3, 0.26)
+RADIUS = 0.26
 sides = st.sampled_from(["left", "right", None])
 
 
-def sight_of(tip, distance=DISTANCE, height=0.0):
-    """How a tip (right, up, toward the camera; face widths) is seen from so far away."""
-    right, up, toward = (float(value) for value in tip)
-    return TipSight(right / (distance - toward), (height + up) / math.hypot(distance - toward, right), distance, height)
+def sight_of(tip, fist, distance=DISTANCE, height=0.0):
+    """How a tip and a fist (right, up, toward the camera; face widths) are seen from so far away."""
+
+    def ray(place):
+        right, up, toward = (float(value) for value in place)
+        return Ray(right / (distance - toward), (height + up) / math.hypot(distance - toward, right))
+
+    return ArmSight(ray(tip), ray(fist), RADIUS, distance, height)
 
 
 def held_arms(count, seed=1):
@@ -33,15 +37,16 @@ def held_arms(count, seed=1):
     with np.errstate(divide="ignore"):
         truth = BEARINGS[arms.share[:, :half].argmax(axis=0)]
     for k in rng.integers(0, half, count):
-        yield truth[k], ("left" if arms.left[k] else "right"), arms.tips[k] + rng.normal(0, 0.2, 3)
+        missed = rng.normal(0, 0.2, 3)
+        yield truth[k], ("left" if arms.left[k] else "right"), arms.tips[k] + missed, arms.fists[k] + missed
 
 
 @settings(deadline=None)  # the first example loads the arms
-@given(st.floats(-0.6, 0.6), st.floats(-0.5, 0.3), st.floats(5, 40), sides)
-def test_left_and_right_mirror_each_other(aside, slope, distance, side):
+@given(st.floats(-0.6, 0.6), st.floats(-0.5, 0.3), st.floats(0.5, 1.2), st.floats(5, 40), sides)
+def test_left_and_right_mirror_each_other(aside, slope, inner, distance, side):
     other = {"left": "right", "right": "left", None: None}[side]
-    here = arms_likelihood(TipSight(aside, slope, distance, 1.0), side)
-    there = arms_likelihood(TipSight(-aside, slope, distance, 1.0), other)
+    here = arms_likelihood(ArmSight(Ray(aside, slope), Ray(inner * aside, -0.1), RADIUS, distance, 1.0), side)
+    there = arms_likelihood(ArmSight(Ray(-aside, slope), Ray(-inner * aside, -0.1), RADIUS, distance, 1.0), other)
     assert here[1:] == pytest.approx(there[:0:-1], abs=1e-4)
     assert here.max() == pytest.approx(1.0)
     assert here.min() > 0
@@ -49,8 +54,8 @@ def test_left_and_right_mirror_each_other(aside, slope, distance, side):
 
 def test_the_likelihood_covers_the_bearing_as_often_as_it_says():
     inside, ranks = [], []
-    for truth, side, tip in held_arms(400):
-        told = arms_likelihood(sight_of(tip), side)
+    for truth, side, tip, fist in held_arms(400):
+        told = arms_likelihood(sight_of(tip, fist), side)
         order = np.argsort(-told)
         share = np.cumsum(told[order]) / told.sum()
         place = int(np.nonzero(order == int(np.argmin(np.abs(BEARINGS - truth))))[0][0])
@@ -62,14 +67,27 @@ def test_the_likelihood_covers_the_bearing_as_often_as_it_says():
 
 
 def test_pointing_aside_is_told_from_pointing_ahead():
-    aside = estimate_bearing(PLAIN, sight_of((4.2, -1.0, 0.6)), "left")
-    ahead = estimate_bearing(PLAIN, sight_of((0.6, -0.6, 3.4)), "left")
+    aside = estimate_bearing(sight_of((4.2, -1.0, 0.6), (3.5, -1.1, 0.5)), "left")
+    ahead = estimate_bearing(sight_of((0.6, -0.6, 3.4), (0.7, -0.8, 2.8)), "left")
     assert 50 < aside.deg < 110
     assert abs(ahead.deg) < 35
 
 
+def test_a_finger_that_shows_its_whole_length_points_aside():
+    tip = (3.2, -1.1, 0.0)
+    whole, short = (arms_likelihood(sight_of(tip, (3.2 - shown, -1.1, 0.0)), "left") for shown in (0.9, 0.3))
+    beside, toward = (np.abs(BEARINGS - at).argmin() for at in (90.0, 40.0))
+    assert whole[beside] / whole[toward] > 1.5 * short[beside] / short[toward]
+
+
+def test_a_finger_that_is_lost_leaves_every_bearing_possible():
+    tip = (4.2, -1.0, 0.6)
+    seen, lost = (arms_likelihood(sight_of(tip, (4.2 - shown, -1.0, 0.5)), "left") for shown in (0.75, 0.25))
+    assert (lost > bearing.OUTLIERS * seen / 2).all()
+
+
 def test_a_tip_where_no_arm_reaches_tells_nothing():
-    nowhere = arms_likelihood(sight_of((9.0, 6.0, 0.0)), "left")
+    nowhere = arms_likelihood(sight_of((9.0, 6.0, 0.0), (8.4, 5.8, 0.0)), "left")
     assert nowhere.min() == nowhere.max() == 1.0
 
 
@@ -85,9 +103,10 @@ def test_a_camera_that_is_tilted_and_rolled_sees_the_same_pointing():
         yaw = np.array([[math.cos(turned), -math.sin(turned), 0], [math.sin(turned), math.cos(turned), 0], [0, 0, 1]])
         seen.append(view_of(mount, *(to_level.T @ yaw @ at for at in (head, place))))
     for other in seen[1:]:
-        assert (other.aside, other.slope) == pytest.approx((seen[0].aside, seen[0].slope), abs=0.01)
+        assert (other.tip.aside, other.tip.slope) == pytest.approx((seen[0].tip.aside, seen[0].tip.slope), abs=0.01)
+        assert (other.fist.aside, other.fist.slope) == pytest.approx((seen[0].fist.aside, seen[0].fist.slope), abs=0.01)
         assert (other.distance, other.height) == pytest.approx((seen[0].distance, seen[0].height), rel=0.03)
-    assert seen[0].aside == pytest.approx(3.0 / (np.hypot(*head[:2]) - 1.5), abs=0.02)
+    assert seen[0].tip.aside == pytest.approx(3.0 / (np.hypot(*head[:2]) - 1.5), abs=0.02)
 
 
 def view_of(mount, head, tip):
@@ -96,11 +115,11 @@ def view_of(mount, head, tip):
     (x, y), (tip_x, tip_y) = ((fx * p[0] / p[2] + cx, fy * p[1] / p[2] + cy) for p in (head, tip))
     width = LENS.pinhole_at((x, y), (640, 480)).focal_px / float(np.linalg.norm(head))
     face = Face(x, y + HEAD_ABOVE_FACE * width, width)
-    sight = HandSight((tip_x - face.x_px) / width, (tip_y - face.y_px) / width, 0.3, 0.26)
-    return View(LENS, (640, 480), mount).tip_of(face, sight)
+    tip = (tip_x - face.x_px) / width, (tip_y - face.y_px) / width
+    return View(LENS, (640, 480), mount).arm_of(face, HandSight(tip, (0.8 * tip[0], 0.8 * tip[1]), RADIUS))
 
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, float("nan")])
 def test_a_distance_that_is_none_is_refused_by_name(distance):
     with pytest.raises(ValueError, match="distance"):
-        estimate_bearing(PLAIN, TipSight(0.3, 0.0, distance, 0.0), None)
+        estimate_bearing(ArmSight(Ray(0.3, 0.0), Ray(0.25, 0.0), RADIUS, distance, 0.0), None)

@@ -206,8 +206,8 @@ def test_a_frame_of_twice_the_size_through_the_same_lens_gives_the_same_gestures
 def test_a_persons_distance_follows_from_the_lens(focal_px):
     view = View(Lens(640, 480, (focal_px, focal_px, 319.5, 239.5)), (640, 480), CameraMount())
     face = Face(320.0, 150.0, focal_px * FACE_WIDTH_M / 2.0)
-    tip = view.tip_of(face, HandSight(0.0, 0.0, 0.3, 0.3))
-    assert math.hypot(tip.distance, tip.height) == pytest.approx(2.0 / FACE_WIDTH_M)
+    arm = view.arm_of(face, HandSight((0.0, 0.0), (0.0, 0.0), 0.3))
+    assert math.hypot(arm.distance, arm.height) == pytest.approx(2.0 / FACE_WIDTH_M)
 
 
 def test_a_hand_that_is_held_still_is_still_for_a_camera_that_turns():
@@ -236,7 +236,7 @@ def test_the_bearing_is_that_of_the_last_half_second_at_any_frame_rate(rate_hz):
         arm.update(_hand(place, POINT), face, (0.0, 0.0), time_s, 1 / rate_hz)
     assert arm.phase == "stroke"
     assert arm.sight is not None
-    assert arm.sight.offset == pytest.approx(-3.95, abs=0.1)
+    assert arm.sight.tip[0] == pytest.approx(-3.95, abs=0.1)
 
 
 def test_a_face_too_small_to_measure_by_gives_no_gesture():

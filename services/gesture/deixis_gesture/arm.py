@@ -22,7 +22,7 @@ Point = tuple[float, float]
 
 # Time over which it is averaged which side's hand it is.
 SIDE_TIME_S = 0.205
-# Offset and finger length are the medians of so much of a stroke.
+# Tip and fist are the medians of so much of a stroke.
 MEASURED_S = 0.48
 # The outline is worth its cost only near a stroke: hands lower than this below the face are at rest.
 LOW = 3.6
@@ -74,12 +74,8 @@ class Arm:
         if not self._measures:
             return None
         sights = [sight for _, sight in self._measures]
-        return HandSight(
-            statistics.median(sight.offset for sight in sights),
-            statistics.median(sight.drop for sight in sights),
-            statistics.median(sight.finger for sight in sights),
-            statistics.median(sight.palm for sight in sights),
-        )
+        tip, fist = (_middle([getattr(sight, name) for sight in sights]) for name in ("tip", "fist"))
+        return HandSight(tip, fist, statistics.median(sight.radius for sight in sights))
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""
@@ -137,8 +133,7 @@ class Arm:
         return math.dist(place, fellow) <= self._config.hands_together
 
     def _measure(self, hand: HandShape, time_s: float) -> None:
-        finger = self.fingers[0].length if self.fingers else 0.0
-        self._measures.append((time_s, HandSight(hand.tip[0], hand.tip[1], finger, hand.palm_radius)))
+        self._measures.append((time_s, HandSight(hand.tip, hand.palm, hand.palm_radius)))
         while time_s - self._measures[0][0] > MEASURED_S:
             self._measures.popleft()
 
@@ -156,6 +151,11 @@ class Arm:
         if (track.bbox_px[1] - face.y_px) / face.width_px > LOW:
             return None
         return hand_of(face.normalised(unpack_contour(track.contour)))
+
+
+def _middle(points: list[Point]) -> Point:
+    xs, ys = zip(*points, strict=True)
+    return statistics.median(xs), statistics.median(ys)
 
 
 def _about(face: Face, point_px: tuple[float, float]) -> tuple[float, float]:

@@ -32,11 +32,12 @@ NEAREST = 0.3
 NO_ARM = 0.005
 """Likelihood, beside the largest, of what no arm does."""
 LEAST_SIGMA_DEG = 8.0
-# Visible length of the index finger against the bearing (foreshortened in front, hidden by the fist behind), and radius of the
-# fist (larger toward the camera). Eased from hands of the rendered clips; they say little: fingers are lost at any bearing.
+LEAST_EXTENT = 0.3
+"""From the fist's middle to the end of its outline, face widths, where no finger shows."""
+EXTENT_SIGMA, DIRECTION_SIGMA = 0.15, 0.35
+"""How far off the way from the fist's middle to the fingertip is measured: its length, face widths, and direction, radians."""
+# Radius of the fist against the bearing (larger toward the camera). Eased from hands of the rendered clips; it says little.
 SHAPE_BEARINGS = np.array([0.0, 20.0, 40.0, 80.0, 100.0, 115.0, 135.0, 180.0])
-FINGER_LENGTHS = np.array([0.08, 0.28, 0.52, 0.56, 0.34, 0.24, 0.08, 0.0])
-FINGER_SIGMA = 0.11
 PALM_RADII = np.array([0.33, 0.31, 0.27, 0.24, 0.24, 0.23, 0.20, 0.19])
 PALM_SIGMA = 0.05
 OUTLIERS = 0.3
@@ -60,49 +61,58 @@ class Bearing:
 
 @dataclass(frozen=True)
 class HandSight:
-    """A pointing hand as seen: tip beside the face's middle (positive toward image right) and below it, lengths of finger and
-    palm; face widths.
+    """A pointing hand as seen, face widths: tip, and the fist's middle, each beside the face's middle (positive toward image
+    right) and below it; radius of the fist.
     """
 
-    offset: float
-    drop: float
-    finger: float
-    palm: float
+    tip: tuple[float, float]
+    fist: tuple[float, float]
+    radius: float
 
 
 @dataclass(frozen=True)
-class TipSight:
-    """A tip as a level camera sees it that looks at the head, lengths in face widths of the person.
-
-    aside: tangent of the angle between head and tip seen from above, positive toward image right; slope: how much the sight of
-    the tip rises for each length on the floor. distance: to the head on the floor; height: of the head above the camera.
+class Ray:
+    """Where a level camera that looks at the head sees something. aside: tangent of the angle to the head seen from above,
+    positive toward image right; slope: how much the sight of it rises for each length on the floor.
     """
 
     aside: float
     slope: float
+
+
+@dataclass(frozen=True)
+class ArmSight:
+    """A pointing arm as a level camera sees it that looks at the head, lengths in face widths of the person.
+
+    distance: to the head on the floor; height: of the head above the camera; radius: of the fist.
+    """
+
+    tip: Ray
+    fist: Ray
+    radius: float
     distance: float
     height: float
 
 
-def estimate_bearing(sight: HandSight, tip: TipSight, side: Side | None) -> Bearing:
-    """Bearing of a pointing hand, the person's own `side` where that is known. Raises ValueError for no positive distance."""
-    if not tip.distance > 0:
-        raise ValueError(f"distance: {tip.distance} face widths, must be positive")
-    likelihood = arms_likelihood(tip, side)
-    size = np.abs(BEARINGS)
-    likelihood = likelihood * _tail_normal(sight.finger, size, FINGER_LENGTHS, FINGER_SIGMA)
-    likelihood = likelihood * _tail_normal(sight.palm, size, PALM_RADII, PALM_SIGMA)
+def estimate_bearing(seen: ArmSight, side: Side | None) -> Bearing:
+    """Bearing of a pointing arm, the person's own `side` where that is known. Raises ValueError for no positive distance."""
+    if not seen.distance > 0:
+        raise ValueError(f"distance: {seen.distance} face widths, must be positive")
+    likelihood = arms_likelihood(seen, side)
+    expected = np.interp(np.abs(BEARINGS), SHAPE_BEARINGS, PALM_RADII)
+    likelihood = likelihood * _with_outliers(np.exp(-0.5 * ((seen.radius - expected) / PALM_SIGMA) ** 2))
     return _described(likelihood / likelihood.max())
 
 
-def arms_likelihood(tip: TipSight, side: Side | None) -> Floats:
-    """How likely each of BEARINGS puts a fingertip there, its largest 1."""
+def arms_likelihood(seen: ArmSight, side: Side | None) -> Floats:
+    """How likely each of BEARINGS puts fingertip and fist there, its largest 1."""
     arms = load_arms()
-    ahead = np.maximum(tip.distance - arms.tips[:, 2], NEAREST * tip.distance)
-    aside = arms.tips[:, 0] - tip.aside * ahead
-    off = tip.height + arms.tips[:, 1] - tip.slope * np.hypot(ahead, arms.tips[:, 0])
+    tips, fists = _seen_at(arms.tips, seen), _seen_at(arms.fists, seen)
+    off = tips[:, :2] - (seen.tip.aside, seen.tip.slope)
     sigma = np.hypot(TIP_SIGMA, FAR_TIP_SIGMA * arms.lengths)
-    fits = np.exp(-0.5 * (aside**2 + off**2) / sigma**2) / sigma**2
+    fits = np.exp(-0.5 * np.sum((off * tips[:, 2:]) ** 2, axis=1) / sigma**2) / sigma**2
+    way = np.array([seen.tip.aside - seen.fist.aside, seen.tip.slope - seen.fist.slope])
+    fits = fits * _with_outliers(_finger_fits(seen.distance * (tips - fists)[:, :2], seen.distance * way))
     if side is not None:
         fits = np.where(arms.left == (side == "left"), fits, 0.0)
     likelihood = arms.share @ fits
@@ -112,13 +122,32 @@ def arms_likelihood(tip: TipSight, side: Side | None) -> Floats:
     return np.asarray((1 - NO_ARM) * likelihood / most + NO_ARM)
 
 
+def _seen_at(places: Floats, seen: ArmSight) -> Floats:
+    """Of places (n, 3) about the head: aside, slope, and the distance on the floor (n, 3)."""
+    ahead = np.maximum(seen.distance - places[:, 2], NEAREST * seen.distance)
+    floor = np.hypot(ahead, places[:, 0])
+    return np.stack([places[:, 0] / ahead, (seen.height + places[:, 1]) / floor, ahead], axis=1)
+
+
+def _finger_fits(expected: Floats, way: Floats) -> Floats:
+    """How well the way from fist to tip, face widths, is that which is expected of arms (n, 2), largest 1."""
+    lengths, length = np.hypot(expected[:, 0], expected[:, 1]), float(np.hypot(*way))
+    off = (np.maximum(lengths, LEAST_EXTENT) - max(length, LEAST_EXTENT)) / EXTENT_SIGMA
+    cross = expected[:, 0] * way[1] - expected[:, 1] * way[0]
+    turned = np.arctan2(cross, expected @ way) / DIRECTION_SIGMA
+    # A finger that is hidden by its fist has no direction.
+    clear = np.minimum(1.0, np.minimum(lengths, length) / LEAST_EXTENT)
+    return np.asarray(np.exp(-0.5 * (off**2 + clear**2 * turned**2)))
+
+
 @dataclass(frozen=True)
 class Arms:
-    """tips (n, 3): right, up, toward the camera from the head; left (n,); lengths (n,); share (bearings, n): to which bearing
-    an arm counts, each row's sum 1.
+    """tips, fists (n, 3): right, up, toward the camera from the head; left (n,); lengths (n,); share (bearings, n): to which
+    bearing an arm counts, each row's sum 1.
     """
 
     tips: Floats
+    fists: Floats
     left: NDArray[np.bool_]
     lengths: Floats
     share: Floats
@@ -129,19 +158,18 @@ def load_arms() -> Arms:
     """The arms and their mirror images, for either hand does the same."""
     with files("deixis_gesture").joinpath("arms.npz").open("rb") as file:
         stored = np.load(file)
-        bearings, left, tips = (stored[name] for name in ("bearings_deg", "left", "tips"))
+        bearings, left = stored["bearings_deg"], stored["left"]
+        tips, fists = (np.concatenate([at, at * (-1, 1, 1)]).astype(np.float32) for at in (stored["tips"], stored["fists"]))
     bearings = np.concatenate([bearings, -bearings]).astype(np.float32)
-    tips = np.concatenate([tips, tips * (-1, 1, 1)]).astype(np.float32)
     off = (BEARINGS[:, None] - bearings + 180) % 360 - 180
     share = np.exp(-0.5 * (off / NEAR_DEG) ** 2)
     share = (share / share.sum(axis=1, keepdims=True)).astype(np.float32)
-    return Arms(tips, np.concatenate([left, ~left]), np.linalg.norm(tips, axis=1), share)
+    return Arms(tips, fists, np.concatenate([left, ~left]), np.linalg.norm(tips, axis=1), share)
 
 
-def _tail_normal(seen: float, size: Floats, means: Floats, sigma: float) -> Floats:
-    """Likelihood of a measure with these means at `SHAPE_BEARINGS`, and a share of outliers."""
-    expected = np.interp(size, SHAPE_BEARINGS, means)
-    return np.asarray((1 - OUTLIERS) * np.exp(-0.5 * ((seen - expected) / sigma) ** 2) + OUTLIERS)
+def _with_outliers(fits: Floats) -> Floats:
+    """A likelihood, largest 1, of what a share of hands does not keep to."""
+    return np.asarray((1 - OUTLIERS) * fits + OUTLIERS)
 
 
 def _described(likelihood: Floats) -> Bearing:

@@ -11,7 +11,7 @@ from deixis_runtime.mount import Vector, to_base
 from deixis_schemas.messages import CameraMount, Gesture, Track
 
 from .arm import Arm
-from .bearing import Bearing, HandSight, TipSight, estimate_bearing
+from .bearing import ArmSight, Bearing, HandSight, Ray, estimate_bearing
 from .config import GestureConfig
 from .hand import Face
 
@@ -38,18 +38,23 @@ class View(NamedTuple):
     mount: CameraMount
     room_went_px: tuple[float, float] = (0.0, 0.0)
 
-    def tip_of(self, face: Face, sight: HandSight) -> TipSight:
-        """The fingertip of a person with this face, as a level camera sees it that looks at the head."""
+    def arm_of(self, face: Face, sight: HandSight) -> ArmSight:
+        """The arm of a person with this face, as a level camera sees it that looks at the head."""
         head = (face.x_px, face.y_px - HEAD_ABOVE_FACE * face.width_px)
         x, y, z = self._level(head)
-        tip_x, tip_y, tip_z = self._level(face.pixels((sight.offset, sight.drop)))
-        floor, tip_floor = math.hypot(x, y), math.hypot(tip_x, tip_y)
+        floor = math.hypot(x, y)
         # Far beside the axis a picture shows things larger: the lens near the face says how far it is along the sight.
         away = self.lens.pinhole_at(head, self.size).focal_px / face.width_px
         distance = away * floor / math.hypot(floor, z)
-        ahead = (x * tip_x + y * tip_y) / floor
-        right = (y * tip_x - x * tip_y) / floor
-        return TipSight(right / max(ahead, 1e-3 * tip_floor), tip_z / tip_floor, distance, distance * z / floor)
+        tip, fist = (self._beside((x / floor, y / floor), face.pixels(place)) for place in (sight.tip, sight.fist))
+        return ArmSight(tip, fist, sight.radius, distance, distance * z / floor)
+
+    def _beside(self, ahead: tuple[float, float], pixel: tuple[float, float]) -> Ray:
+        """A pixel beside the direction `ahead` on the floor."""
+        x, y, z = self._level(pixel)
+        floor = math.hypot(x, y)
+        right = ahead[1] * x - ahead[0] * y
+        return Ray(right / max(ahead[0] * x + ahead[1] * y, 1e-3 * floor), z / floor)
 
     def _level(self, pixel: tuple[float, float]) -> Vector:
         """Direction of a pixel: forward, left, up."""
@@ -181,4 +186,4 @@ def _fellow(track: Track, hands: Sequence[Track], face: Face) -> tuple[float, fl
 def _bearing(arm: Arm, face: Face, view: View) -> Bearing | None:
     """Bearing of the arm's pointing."""
     sight = arm.sight
-    return None if sight is None else estimate_bearing(sight, view.tip_of(face, sight), arm.side)
+    return None if sight is None else estimate_bearing(view.arm_of(face, sight), arm.side)

@@ -18,12 +18,13 @@ from deixis_tracker.camera_motion import CameraMotion
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import load_cascade
 from deixis_tracker.finder import Finder
+from deixis_tracker.fingers import with_fingers
 from deixis_tracker.found_hands import found_hands
 from deixis_tracker.frame import Image, Mask, Step, Views, coarsened
 from deixis_tracker.hand_tracks import HandTracks
 from deixis_tracker.head_tracks import HeadTracks
-from deixis_tracker.persons import people_mask, tracks_of
-from deixis_tracker.segmentation import hand_blobs
+from deixis_tracker.persons import Person, people_mask, tracks_of
+from deixis_tracker.segmentation import hand_blobs, head_zone
 from deixis_tracker.skin import SkinModel, is_grey
 
 LEAST_SIDE_PX = 32
@@ -106,12 +107,24 @@ class Tracker:
             blobs = hand_blobs(views, self._skin, self._room, self._motion, persons, self._config)
             blobs += found_hands(views, persons, blobs, self._config)
             self._hands.update(persons, blobs, step)
+            self._find_fingers(persons, views)
         self._people = people_mask(persons, (views.skin.shape[0], views.skin.shape[1]))
         self._room.update(views.coarse, views.changed, self._people, step)
         if step.periods(LEARN_ROOM_S, LEARN_ROOM_AHEAD_S):
             # Clothes count as room: they hide no skin of the colour that is looked for.
             room = np.where((self._people == 0) | (views.skin < self._config.skin_low), 255, 0).astype(np.uint8)
             self._skin.adapt_room(views.coarse, room)
+
+    def _find_fingers(self, persons: list[Person], views: Views) -> None:
+        """What colour missed of the hands that are seen."""
+        hands = [(person, hand) for person in persons for hand in person.hands if hand.blob is not None]
+        if not hands:
+            return
+        size = (views.coarse.shape[0], views.coarse.shape[1])
+        covered = np.asarray(cv2.bitwise_or(self._room.unknown, head_zone(size, persons, 0.0)), np.uint8)
+        for person, hand in hands:
+            if hand.blob is not None:
+                hand.blob = with_fingers(hand.blob, views.full, self._room.room, covered, person.width)
 
     def _follow_camera(self, coarse: Image, step: Step) -> None:
         """Move what is known with the room, where the camera moved."""
