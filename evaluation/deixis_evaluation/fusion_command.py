@@ -22,7 +22,7 @@ from .clip_progress import played
 from .core_config import core_config
 from .episode_scores import OUTCOMES, EpisodeScore
 from .fusion_play import GAPS_DEG, VARIANTS, FusionScore, evaluate_fusion
-from .fusion_summary import CAUSES, DEFINITION, calibration_error, faults, figures, named_at, outcomes, reliability
+from .fusion_summary import CAUSES, DEFINITION, calibration_error, faults, figures, luck, named_at, outcomes, reliability
 from .json_file import write_json
 from .machine import describe_machine, say_machine
 from .table import COLOURS, number, percent
@@ -99,7 +99,9 @@ def gap_table(scores: Sequence[FusionScore]) -> Table:
         table.add_row(f"{gap}°", f"{percent(share.share)} of {share.total}")
     bins = reliability(scores)
     said = "  ".join(f"{one.stated:.2f} -> {one.right.share or 0.0:.2f} ({one.right.total})" for one in bins)
-    table.caption = f"ECE {number(calibration_error(bins), '', 3)}; stated -> true (answers): {said or '-'}"
+    by_luck = luck(scores)
+    beside = f" (were all chances true: {by_luck.mean:.3f}, up to {by_luck.most:.3f})" if by_luck else ""
+    table.caption = f"ECE {number(calibration_error(bins), '', 3)}{beside}; stated -> true (answers): {said or '-'}"
     table.caption_justify = "left"
     return table
 

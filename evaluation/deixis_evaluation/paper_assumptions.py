@@ -21,8 +21,8 @@ def assumptions(study: Study) -> list[str]:
             "is what the gesture "
             "stage errs by on people held out), front and back alike; with a head not computed, the side it is turned to. "
             "deixis_paper_readings is without these two. Places are known exactly. ideal and ideal_paper_readings name the "
-            "likeliest POI by Bayes' rule on the readings of each, knowing how these are drawn: no rules have a higher Cors but "
-            "by chance."
+            "likeliest POI by Bayes' rule on the readings of each, knowing how these are drawn: no rules have a higher Cors "
+            "but by chance."
         )
     if study.mismatch > 0:
         found.append(
