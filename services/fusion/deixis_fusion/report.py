@@ -30,7 +30,10 @@ BEHIND_A_WALL = "behind a wall"
 
 @dataclass(frozen=True)
 class Rows:
-    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`. So many `excluded` ones are named."""
+    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`.
+
+    So many `excluded` ones are named, and with any why the rest is thought; a Belief, which goes out with each frame, has neither.
+    """
 
     top: int
     poi_id: str | None = None
@@ -64,6 +67,7 @@ class PersonReport(NamedTuple):
             "excluded": _excluded(told, rows.poi_id, rows.excluded),
             "excluded_total": len(told.hidden) if rows.excluded else 0,
             "evidence": _evidence(told, self.now_ns),
+            "reason": explain(told) if rows.excluded else "",
             "episode_id": self.episode_id,
         }
         return PersonBelief.model_validate(content)
