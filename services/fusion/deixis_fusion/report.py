@@ -32,7 +32,7 @@ BEHIND_A_WALL = "behind a wall"
 class Rows:
     """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`.
 
-    So many `excluded` ones are named, and with any why the rest is thought; a Belief, which goes out with each frame, has neither.
+    So many `excluded` ones are named, and with any the reason in words; a Belief, which goes out with each frame, has neither.
     """
 
     top: int
