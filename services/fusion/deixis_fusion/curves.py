@@ -185,5 +185,5 @@ def _density(off_deg: Values, sigma_deg: float) -> Values:
 
 
 def _wrapped(angles_deg: Values) -> Values:
-    # A modulo takes five times as long; what is wrapped here are differences of two angles.
+    # A modulo takes five times as long.
     return np.asarray(angles_deg - FULL_CIRCLE_DEG * np.rint(angles_deg / FULL_CIRCLE_DEG))

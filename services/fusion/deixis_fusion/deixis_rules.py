@@ -29,6 +29,8 @@ Values = npt.NDArray[np.float64]
 POSSIBILITY_LEVELS = 5
 # A source whose likelihoods differ by less than this part of the largest tells nothing.
 TOLD = 0.1
+# Likelihoods that sum to less are none.
+LEAST = 1e-300
 NOTHING_TOLD = "nothing was observed that tells the POIs apart"
 
 
@@ -101,9 +103,13 @@ def hand_masses(
     what the bearing tells and nothing else.
     """
     regions = _regions(hand, seen.bearings.likeliest, config, confusion)
+    kept = 1 - config.discount
+    of_single, of_regions = kept * config.refinement, kept * (1 - config.refinement)
     total = sum(weight for _, weight in regions)
-    sets = [(flags, (1 - config.refinement) * weight / total) for flags, weight in regions]
-    return MassVector.normalised(config.refinement / likelihoods.sum() * likelihoods, sets).discounted(config.discount)
+    sets = [(flags, of_regions * weight / total) for flags, weight in regions]
+    everything = np.ones(len(likelihoods), dtype=np.bool_)
+    single = of_single / max(LEAST, float(likelihoods.sum())) * likelihoods
+    return MassVector.normalised(single, [*sets, (everything, config.discount)])
 
 
 def _regions(
@@ -132,8 +138,10 @@ def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config
     told = np.maximum(0.0, likelihoods - floor)
     if head.yaw_deg is None:
         return _out_of_range(told, floor).discounted(config.discount)
-    everything = np.ones(len(likelihoods), dtype=np.bool_)
-    return MassVector.normalised(told / len(told), [(everything, floor)]).discounted(config.discount)
+    single = told / len(told)
+    kept = (1 - config.discount) / max(LEAST, float(single.sum()) + floor)
+    everything = np.ones(len(told), dtype=np.bool_)
+    return MassVector.normalised(kept * single, [(everything, kept * floor + config.discount)])
 
 
 def _out_of_range(possible: Values, floor: float) -> MassVector:

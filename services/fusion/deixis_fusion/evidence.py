@@ -122,7 +122,7 @@ class HandObservation:
     mirror: tuple[float, float] | None = None
 
     def __hash__(self) -> int:
-        # Looked up by in each frame: without the curve, which has 72 values.
+        # Kept curves are looked up by it, for each view in each frame: without the 72 values of the likelihood.
         return hash((self.gesture, self.bearing_deg, self.bearing_sigma_deg, self.agreement, self.hand))
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
@@ -57,7 +58,7 @@ class Frames:
 
     def curves(self, which: Flags) -> Values:
         """The likelihoods of bearings of those of the frames (m, `BEARINGS`), each of which tells one."""
-        told = b"".join([self.samples[i].curve for i in which.nonzero()[0].tolist()])
+        told = b"".join([sample.curve for sample in compress(self.samples, which.tolist())])
         return np.frombuffer(told).reshape(-1, BEARINGS)
 
     def placed(self) -> Frames:

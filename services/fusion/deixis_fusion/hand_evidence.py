@@ -59,18 +59,15 @@ def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, 
         return ()
     weights, curves = frames.weights[told], frames.curves(told)
     steps = np.rint(turns_deg[told] / SAME_AXIS_DEG)
+    if not steps.any():
+        return tuple((weights @ curves / weights.sum()).tolist())
     turns = np.array(sorted(set(steps.tolist())))
-    if len(turns) == 1:
-        turned = _turned((weights @ curves)[None], turns * SAME_AXIS_DEG)
-    else:
-        turned = _turned(np.where(steps == turns[:, None], weights, 0.0) @ curves, turns * SAME_AXIS_DEG)
+    turned = _turned(np.where(steps == turns[:, None], weights, 0.0) @ curves, turns * SAME_AXIS_DEG)
     return tuple((turned.sum(axis=0) / weights.sum()).tolist())
 
 
 def _turned(curves: Values, turns_deg: Values) -> Values:
     """Curves of bearings (m, n) with all bearings of each turned (m), on a line between their values."""
-    if not turns_deg.any():
-        return curves
     steps = np.arange(BEARINGS) - turns_deg[:, None] / BEARING_STEP_DEG
     below = np.floor(steps)
     share, place = steps - below, below.astype(np.intp)

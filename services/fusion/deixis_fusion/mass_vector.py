@@ -96,15 +96,9 @@ class MassVector:
 
     def discounted(self, rate: float) -> MassVector:
         """Shafer's discounting: keep 1 - rate of every mass, give `rate` to the whole frame."""
-        single, sets, masses = self.single * (1 - rate), self.members, self.masses * (1 - rate)
-        full = (self.sizes == self.size).nonzero()[0]
-        if self.size == 1 or rate == 0:
-            return self
-        if len(full):
-            masses[full] += rate
-            return MassVector(single, sets, masses)
         everything = np.ones((1, self.size), dtype=np.bool_)
-        return MassVector(single, np.concatenate([sets, everything]), np.append(masses, rate))
+        sets, masses = np.concatenate([self.members, everything]), np.append(self.masses * (1 - rate), rate)
+        return _normalised(self.single * (1 - rate), sets, masses)
 
     def largest(self, count: int) -> list[Focal]:
         """The sets of largest mass, single hypotheses among them."""
@@ -137,6 +131,9 @@ class Combined(NamedTuple):
 
 def combine(first: MassVector, second: MassVector) -> Combined:
     """Dempster's rule, eqs 13-15. Total conflict, which eq. 15 leaves undefined, gives vacuous belief and conflict 1."""
+    for one, other in ((first, second), (second, first)):
+        if one.unknown == 1.0:
+            return Combined(other, 0.0)  # nobody pointed: ignorance beside what the head tells
     single = first.single * (second.single + second.masses @ second.members) + second.single * (first.masses @ first.members)
     sets = (first.members[:, None] & second.members).reshape(-1, first.size)
     joint, agreement = _gathered(single, sets, np.multiply.outer(first.masses, second.masses).ravel())

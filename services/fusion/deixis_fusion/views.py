@@ -67,7 +67,7 @@ def _starts(spots: Sequence[tuple[float, float]], apart_m: float) -> list[int]:
 
 
 def _view(part: Frames, hand: HandObservation | None, head: HeadObservation | None) -> View:
-    """What a part shows; the gesture, and how far all agree, is that of the whole stroke."""
+    """What a part shows; the gesture is that of the whole stroke, and how far its frames agree is told there alone."""
     seen = _shown(tuple(part.samples), tuple(part.weights.tolist()), hand.gesture if hand else None)
     return seen if head is not None else seen._replace(head=None)
 

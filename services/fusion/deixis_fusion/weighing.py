@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache, partial
-from typing import NamedTuple, TypeVar
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,8 @@ AT_A_TIME = 4096
 MANY = 500
 
 
-class Weighing(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Weighing:
     """Of each POI in sight (n): the likelihood of the hand, of the head and of both, and how well it fits.
 
     `hand` and `head` are each on their own the mean over the cases of `sight.py`; `joint` is the mean of their product, for
@@ -43,7 +45,7 @@ class Weighing(NamedTuple):
     fit: Values
     head_floor: float = 0.0
 
-    @property
+    @cached_property
     def contour_conflict(self) -> float:
         """1 - max_i (L1_i / max L1) (L2_i / max L2): 0 where one POI is the likeliest of both, at any number of POIs.
 
@@ -103,8 +105,8 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
     by_name = dict(zip((*told, "joint", "most"), found, strict=True))
     hand, head = (by_name[name] if name in told else np.ones(len(seen)) for name in ("hand", "head"))
     joint, most = by_name["joint"], by_name["most"]
-    best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
-    floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
+    best = math.prod(stacked.max(axis=2).ravel().tolist())
+    floor = math.prod(told["head"].min(axis=1).tolist()) if "head" in told else 1.0
     return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves.head_config)
 
 
@@ -114,9 +116,9 @@ def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices
     Of a walk past very many those whose bearing is well known are weighed in few cases: each is weighed from every place.
     """
     everybody = np.arange(len(seen))
-    well_known = seen.bearings.sigma < FEW_BELOW_DEG
     groups = [(everybody, CASES)]
     if places and len(seen) > MANY:
+        well_known = seen.bearings.sigma < FEW_BELOW_DEG
         groups = [(everybody[~well_known], CASES), (everybody[well_known], FEW_CASES)]
     for which, count in groups:
         at_a_time = max(1, AT_A_TIME * CASES // (count * max(1, len(places))))
