@@ -35,7 +35,8 @@ RING_REACH_DEG = 180
 @dataclass(frozen=True)
 class GapAnswer:
     """What was answered of a stroke with POIs every `gap_deg` around the person. chance: that of the likeliest, as stated, and
-    whether that one was meant; none where nothing was answered. `stroke` is its number in the clip.
+    whether that one was meant; none where nothing was answered. `stroke` is its number in the clip. by_masses: the same of the
+    POI of the largest pignistic probability, which explains and does not decide.
     """
 
     gap_deg: int
@@ -43,6 +44,7 @@ class GapAnswer:
     chance: float | None
     is_meant: bool
     stroke: int = 0
+    by_masses: tuple[float, bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,9 @@ def _answer(recording: Recording, episode: EpisodeScore, stroke: int, gap: int) 
     ranked = sorted(target.pois, key=lambda poi: -(poi.probability or 0.0)) if target else []
     if not ranked or ranked[0].probability is None:
         return GapAnswer(gap, episode.outcome, None, False, stroke)
-    return GapAnswer(gap, episode.outcome, ranked[0].probability, ranked[0].poi_id == episode.poi, stroke)
+    first = max(ranked, key=lambda poi: poi.pignistic)
+    by_masses = first.pignistic, first.poi_id == episode.poi
+    return GapAnswer(gap, episode.outcome, ranked[0].probability, ranked[0].poi_id == episode.poi, stroke, by_masses)
 
 
 def _target_of(recording: Recording, episode: EpisodeScore) -> Target | None:

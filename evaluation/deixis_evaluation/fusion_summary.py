@@ -68,9 +68,12 @@ def named_at(scores: Sequence[FusionScore], gap_deg: int) -> Proportion:
     return Proportion.of(answer.outcome == "named" for answer in _gaps(scores) if answer.gap_deg == gap_deg)
 
 
-def reliability(scores: Sequence[FusionScore]) -> list[Bin]:
-    """By stated chance, the lowest first; empty bins left out."""
-    told = [(answer.chance, answer.is_meant) for answer in _gaps(scores) if answer.chance is not None]
+def reliability(scores: Sequence[FusionScore], by_masses: bool = False) -> list[Bin]:
+    """By stated chance, or by the masses' pignistic probability, the lowest first; empty bins left out."""
+    answers = _gaps(scores)
+    told = [(answer.chance, answer.is_meant) for answer in answers if answer.chance is not None]
+    if by_masses:
+        told = [answer.by_masses for answer in answers if answer.by_masses is not None]
     bins = []
     for number in range(BINS):
         own = [(chance, right) for chance, right in told if min(int(chance * BINS), BINS - 1) == number]
@@ -107,7 +110,7 @@ def luck(scores: Sequence[FusionScore]) -> Luck | None:
 
 def figures(scores: Sequence[FusionScore]) -> dict[str, Any]:
     """What the JSON file says of all clips."""
-    bins, by_luck = reliability(scores), luck(scores)
+    bins, of_masses, by_luck = reliability(scores), reliability(scores, by_masses=True), luck(scores)
     return {
         "clips": len(scores),
         "outcomes": {variant: dict(outcomes(scores, variant)) for variant in VARIANTS},
@@ -116,10 +119,16 @@ def figures(scores: Sequence[FusionScore]) -> dict[str, Any]:
         "named_at_gap": {
             str(gap): {"share": named_at(scores, gap).share, "of": named_at(scores, gap).total} for gap in GAPS_DEG
         },
-        "reliability": [{"stated": one.stated, "right": one.right.share, "answers": one.right.total} for one in bins],
+        "reliability": _rows(bins),
         "ece": calibration_error(bins),
         "ece_if_chances_are_true": by_luck and {"mean": by_luck.mean, "percentile_95": by_luck.most},
+        "reliability_of_masses": _rows(of_masses),
+        "ece_of_masses": calibration_error(of_masses),
     }
+
+
+def _rows(bins: Sequence[Bin]) -> list[dict[str, Any]]:
+    return [{"stated": one.stated, "right": one.right.share, "answers": one.right.total} for one in bins]
 
 
 def _gaps(scores: Sequence[FusionScore]) -> list[GapAnswer]:

@@ -58,6 +58,14 @@ def test_chances_that_are_too_high_show():
     assert calibration_error([only]) == pytest.approx(0.95)
 
 
+def test_the_masses_have_a_reliability_of_their_own():
+    answers = [GapAnswer(22, "named", 0.95, True, i, (0.55, i == 0)) for i in range(2)]
+    told = figures([_clip_of(gaps=answers)])
+    assert told["ece"] == pytest.approx(0.05)
+    assert told["reliability_of_masses"] == [{"stated": pytest.approx(0.55), "right": 0.5, "answers": 2}]
+    assert told["ece_of_masses"] == pytest.approx(0.05)
+
+
 def _stated(*chances, strokes):
     return [GapAnswer(30, "named", chance, True, i % strokes) for i, chance in enumerate(chances)]
 
