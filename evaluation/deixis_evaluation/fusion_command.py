@@ -52,6 +52,8 @@ def run_fusion(
     machine = describe_machine()
     for table in (stroke_table(scores), outcome_table(scores), gap_table(scores)):
         console.print(table)
+    for line in calibration_lines(scores):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(DEFINITION, style="dim", markup=False, highlight=False)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     settings = {stage: list(values) for stage, values in sets.items()}
@@ -92,22 +94,27 @@ def outcome_table(scores: Sequence[FusionScore]) -> Table:
 
 
 def gap_table(scores: Sequence[FusionScore]) -> Table:
-    """Named by gap; and the reliability of the stated chance, beside that of the masses' pignistic probability."""
+    """Named by gap."""
     table = Table("POIs every", "named", title="Among rings of POIs", box=box.SIMPLE_HEAD, title_justify="left")
     for gap in GAPS_DEG:
         share = named_at(scores, gap)
         table.add_row(f"{gap}°", f"{percent(share.share)} of {share.total}")
-    by_luck = luck(scores)
-    beside = f" (were all chances true: {by_luck.mean:.3f}, up to {by_luck.most:.3f})" if by_luck else ""
-    chances, masses = reliability(scores), reliability(scores, by_masses=True)
-    table.caption = f"{_calibration(chances, beside)}\nby masses, which decide nothing: {_calibration(masses)}"
-    table.caption_justify = "left"
     return table
 
 
-def _calibration(bins: Sequence[Bin], beside: str = "") -> str:
+def calibration_lines(scores: Sequence[FusionScore]) -> list[str]:
+    """The reliability of the stated chance, and of the masses' pignistic probability: stated -> true (answers)."""
+    by_luck = luck(scores)
+    beside = f" (were all chances true: {by_luck.mean:.3f}, up to {by_luck.most:.3f})" if by_luck else ""
+    return [
+        f"ECE {_reliability(reliability(scores), beside)}",
+        f"ECE by masses, which decide nothing: {_reliability(reliability(scores, by_masses=True))}",
+    ]
+
+
+def _reliability(bins: Sequence[Bin], beside: str = "") -> str:
     said = "  ".join(f"{one.stated:.2f} -> {one.right.share or 0.0:.2f} ({one.right.total})" for one in bins)
-    return f"ECE {number(calibration_error(bins), '', 3)}{beside}; stated -> true (answers): {said or '-'}"
+    return f"{number(calibration_error(bins), '', 3)}{beside}; stated -> true (answers): {said or '-'}"
 
 
 def _answer(episode: EpisodeScore) -> str:
