@@ -59,7 +59,7 @@ def weighed(count: int, world: World, config: FusionConfig, rng: np.random.Gener
     for number in NUMBERS:
         for _ in range(count):
             stroke = draw(number, world, config, rng, away)
-            weighing = weigh(stroke.evidence, stroke.seen, config.hand, config.head)
+            weighing = weigh(stroke.evidence, stroke.seen, rules.curves)
             found.append(Weighed(stroke, weighing, rules.judge(stroke.seen, stroke.evidence).pignistic))
     return found
 

@@ -22,7 +22,7 @@ from .clip_progress import played
 from .core_config import core_config
 from .episode_scores import OUTCOMES, EpisodeScore
 from .fusion_play import GAPS_DEG, VARIANTS, FusionScore, evaluate_fusion
-from .fusion_summary import CAUSES, DEFINITION, calibration_error, faults, figures, named_at, outcomes, reliability
+from .fusion_summary import CAUSES, DEFINITION, Bin, calibration_error, faults, figures, luck, named_at, outcomes, reliability
 from .json_file import write_json
 from .machine import describe_machine, say_machine
 from .table import COLOURS, number, percent
@@ -52,6 +52,8 @@ def run_fusion(
     machine = describe_machine()
     for table in (stroke_table(scores), outcome_table(scores), gap_table(scores)):
         console.print(table)
+    for line in calibration_lines(scores):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(DEFINITION, style="dim", markup=False, highlight=False)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     settings = {stage: list(values) for stage, values in sets.items()}
@@ -92,16 +94,27 @@ def outcome_table(scores: Sequence[FusionScore]) -> Table:
 
 
 def gap_table(scores: Sequence[FusionScore]) -> Table:
-    """Named by gap; and the reliability of the stated chance."""
+    """Named by gap."""
     table = Table("POIs every", "named", title="Among rings of POIs", box=box.SIMPLE_HEAD, title_justify="left")
     for gap in GAPS_DEG:
         share = named_at(scores, gap)
         table.add_row(f"{gap}°", f"{percent(share.share)} of {share.total}")
-    bins = reliability(scores)
-    said = "  ".join(f"{one.stated:.2f} -> {one.right.share or 0.0:.2f} ({one.right.total})" for one in bins)
-    table.caption = f"ECE {number(calibration_error(bins), '', 3)}; stated -> true (answers): {said or '-'}"
-    table.caption_justify = "left"
     return table
+
+
+def calibration_lines(scores: Sequence[FusionScore]) -> list[str]:
+    """The reliability of the stated chance, and of the masses' pignistic probability: stated -> true (answers)."""
+    by_luck = luck(scores)
+    beside = f" (were all chances true: {by_luck.mean:.3f}, up to {by_luck.most:.3f})" if by_luck else ""
+    return [
+        f"ECE {_reliability(reliability(scores), beside)}",
+        f"ECE by masses, which decide nothing: {_reliability(reliability(scores, by_masses=True))}",
+    ]
+
+
+def _reliability(bins: Sequence[Bin], beside: str = "") -> str:
+    said = "  ".join(f"{one.stated:.2f} -> {one.right.share or 0.0:.2f} ({one.right.total})" for one in bins)
+    return f"{number(calibration_error(bins), '', 3)}{beside}; stated -> true (answers): {said or '-'}"
 
 
 def _answer(episode: EpisodeScore) -> str:

@@ -18,7 +18,7 @@ from deixis_schemas.messages import Gestures, HeadPoses, Poi, Producer, Target, 
 
 from .camera_pose import map_position, path_of
 from .clips import Clip, ClipError
-from .episode_scores import EpisodeScore, Outcome, Stroke, outcome_of, score_episodes, strokes_of
+from .episode_scores import EpisodeScore, Outcome, Stroke, score_episodes, strokes_of
 from .matching import true_persons
 from .recording import Recording
 from .replay import INSTANCE, REPLAYS, START_NS, Given, ReplayError
@@ -35,13 +35,16 @@ RING_REACH_DEG = 180
 @dataclass(frozen=True)
 class GapAnswer:
     """What was answered of a stroke with POIs every `gap_deg` around the person. chance: that of the likeliest, as stated, and
-    whether that one was meant; none where nothing was answered.
+    whether that one was meant; none where nothing was answered. `stroke` is its number in the clip. by_masses: the same of the
+    POI of the largest pignistic probability, which explains and does not decide.
     """
 
     gap_deg: int
     outcome: Outcome
     chance: float | None
     is_meant: bool
+    stroke: int = 0
+    by_masses: tuple[float, bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,7 @@ def _among_rings(clip: Clip, config: FusionConfig, heard: _Heard) -> Iterator[Ga
         for gap in GAPS_DEG:
             recording = _play(clip, config, heard, "as they are", ring_of(clip, stroke, gap))
             episode = _scored(clip, recording)[0][index]
-            yield _answer(recording, episode, stroke, gap)
+            yield _answer(recording, episode, index, gap)
 
 
 def ring_of(clip: Clip, stroke: Stroke, gap_deg: int) -> list[Poi]:
@@ -161,12 +164,14 @@ def ring_of(clip: Clip, stroke: Stroke, gap_deg: int) -> list[Poi]:
     return pois
 
 
-def _answer(recording: Recording, episode: EpisodeScore, stroke: Stroke, gap: int) -> GapAnswer:
+def _answer(recording: Recording, episode: EpisodeScore, stroke: int, gap: int) -> GapAnswer:
     target = _target_of(recording, episode)
     ranked = sorted(target.pois, key=lambda poi: -(poi.probability or 0.0)) if target else []
     if not ranked or ranked[0].probability is None:
-        return GapAnswer(gap, outcome_of(stroke.poi, episode.poi_ids), None, False)
-    return GapAnswer(gap, outcome_of(stroke.poi, episode.poi_ids), ranked[0].probability, ranked[0].poi_id == stroke.poi)
+        return GapAnswer(gap, episode.outcome, None, False, stroke)
+    first = max(ranked, key=lambda poi: poi.pignistic)
+    by_masses = first.pignistic, first.poi_id == episode.poi
+    return GapAnswer(gap, episode.outcome, ranked[0].probability, ranked[0].poi_id == episode.poi, stroke, by_masses)
 
 
 def _target_of(recording: Recording, episode: EpisodeScore) -> Target | None:

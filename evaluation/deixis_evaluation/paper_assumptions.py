@@ -20,7 +20,9 @@ def assumptions(study: Study) -> list[str]:
             f"pointing finger the hand's bearing, off by {HAND_SIGMA_DEG:g} degrees (standard deviation, which "
             "is what the gesture "
             "stage errs by on people held out), front and back alike; with a head not computed, the side it is turned to. "
-            "deixis_paper_readings is without these two. Places are known exactly."
+            "deixis_paper_readings is without these two. Places are known exactly. ideal and ideal_paper_readings name the "
+            "likeliest POI by Bayes' rule on the readings of each, knowing how these are drawn: no rules have a higher Cors "
+            "but by chance."
         )
     if study.mismatch > 0:
         found.append(

@@ -2,7 +2,8 @@
 
 * `rooms.A|B|C` in the mode asked for: `N`, `n_av`, and as shares of N `Corm`, `Cors`, `False`, `Vh`, `Ch`, `Vf`, `Cf`.
   `published` has the same shape; so has `modes.MODE` for each mode that was run on the same trials: `paper`, and with
-  `--mode deixis` also `deixis` and `deixis_paper_readings`, which is without what our stages tell beyond the paper's.
+  `--mode deixis` also `deixis` and `deixis_paper_readings`, which is without what our stages tell beyond the paper's; `ideal`
+  and `ideal_paper_readings`, what the likeliest POI by Bayes' rule comes to on the readings of each.
 * `intervals.A|B|C`: 95 % intervals (Wilson) of the shares in `rooms`.
 * `table_1.GESTURE.REGION`: `share`, `interval_95`, `published`.
 * With `--mismatch`: `mismatch.RULE` has `wrong_above_0.9` (share of the answers with a belief above .9; null where there is

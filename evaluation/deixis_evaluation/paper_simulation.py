@@ -15,12 +15,13 @@ from deixis_fusion.pointing import GESTURES, REGIONS
 from .paper_arrangements import Arrangements, draw
 from .paper_deixis import OURS, PAPERS, DeixisModel
 from .paper_figures import Counts, count, sizes
+from .paper_ideal import ideal_answers
 from .paper_masses import RULES, Answers, Sources, answers, conflict, dempster, sources
 from .paper_rooms import Room
 from .paper_trials import Trials, perceive, regions
 from .proportion import Proportion
 
-Mode = Literal["paper", "deixis", "deixis_paper_readings"]
+Mode = Literal["paper", "deixis_paper_readings", "deixis", "ideal_paper_readings", "ideal"]
 OnTrials = Callable[[int], None]
 PART = 10_000
 """Trials at a time: so a million do not fill the memory."""
@@ -29,7 +30,7 @@ SURE = 0.9
 
 @dataclass(frozen=True)
 class Study:
-    """What is simulated: `trials` in each room. `mode` `deixis` runs the paper's rules on the same trials, too."""
+    """What is simulated: `trials` in each room. Mode `deixis` runs the paper's rules and an ideal observer on them, too."""
 
     trials: int
     seed: int
@@ -121,6 +122,8 @@ class Simulation:
         by_mode: dict[Mode, Answers] = {"paper": answers(dempster(both))}
         if self._study.mode == "deixis":
             by_mode |= {mode: model.answers(trials) for mode, model in self._ours.items()}
+            by_mode["ideal_paper_readings"] = ideal_answers(trials, self._perceived, config, PAPERS)
+            by_mode["ideal"] = ideal_answers(trials, self._perceived, config, OURS)
         result = RoomResult(
             {mode: count(trials, both, self._perceived, answer, config) for mode, answer in by_mode.items()},
             _gestures(trials, config),

@@ -435,6 +435,7 @@ class PersonBelief(Part):
     excluded: list[Excluded] = Field(default_factory=list, max_length=MAX_LISTED, description=EXCLUDED)
     excluded_total: Count = Field(default=0, description="How many they are.")
     evidence: list[Evidence] = Field(default_factory=list, max_length=8)
+    reason: Text = Field(default="", description="Why that is thought, in words. State has it, a Belief leaves it out.")
     episode_id: Text | None = Field(default=None, description="Pointing episode that the person is in.")
 
 

@@ -7,7 +7,7 @@ import pytest
 from deixis_evaluation.clips import Clip, Truth
 from deixis_evaluation.episode_scores import EpisodeScore, strokes_of
 from deixis_evaluation.fusion_play import VARIANTS, FusionScore, GapAnswer, ring_of
-from deixis_evaluation.fusion_summary import calibration_error, faults, figures, named_at, outcomes, reliability
+from deixis_evaluation.fusion_summary import calibration_error, faults, figures, luck, named_at, outcomes, reliability
 
 
 def _episode(outcome):
@@ -56,6 +56,36 @@ def test_chances_that_are_too_high_show():
     (only,) = reliability([_clip_of(gaps=answers)])
     assert (only.stated, only.right.share) == (pytest.approx(0.95), 0.0)
     assert calibration_error([only]) == pytest.approx(0.95)
+
+
+def test_the_masses_have_a_reliability_of_their_own():
+    answers = [GapAnswer(22, "named", 0.95, True, i, (0.55, i == 0)) for i in range(2)]
+    told = figures([_clip_of(gaps=answers)])
+    assert told["ece"] == pytest.approx(0.05)
+    assert told["reliability_of_masses"] == [{"stated": pytest.approx(0.55), "right": 0.5, "answers": 2}]
+    assert told["ece_of_masses"] == pytest.approx(0.05)
+
+
+def _stated(*chances, strokes):
+    return [GapAnswer(30, "named", chance, True, i % strokes) for i, chance in enumerate(chances)]
+
+
+def test_few_answers_have_a_calibration_error_by_luck_and_many_hardly_any():
+    chances = [0.05 + 0.1 * i for i in range(10)]
+    few, many = (luck([_clip_of(gaps=_stated(*chances * count, strokes=10 * count))]) for count in (4, 400))
+    # Four answers a bin, of which a binomial number is right.
+    off = [math.comb(4, k) * p**k * (1 - p) ** (4 - k) * abs(k / 4 - p) for p in chances for k in range(5)]
+    assert few.mean == pytest.approx(sum(off) / 10, abs=0.003)
+    assert many.mean < 0.02
+    assert few.mean < few.most < 0.3
+    assert luck([_clip_of(gaps=_stated(*chances * 4, strokes=40))]) == few
+    assert luck([_clip_of()]) is None
+
+
+def test_answers_of_one_stroke_have_the_luck_of_one():
+    alone = luck([_clip_of(gaps=_stated(0.5, strokes=1))])
+    assert luck([_clip_of(gaps=_stated(*[0.5] * 4, strokes=1))]) == alone == pytest.approx((0.5, 0.5))
+    assert luck([_clip_of(gaps=_stated(*[0.5] * 4, strokes=4))]).mean < 0.3
 
 
 def _truth():

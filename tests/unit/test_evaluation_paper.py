@@ -9,6 +9,7 @@ import pytest
 from deixis_evaluation.paper_arrangements import CLEARANCE_M, FARTHEST_M, NEAREST_M, Arrangements, draw
 from deixis_evaluation.paper_deixis import OURS, PAPERS, DeixisModel, Readings, hand_seen, head_seen
 from deixis_evaluation.paper_figures import PUBLISHED, SHARES, count
+from deixis_evaluation.paper_ideal import ideal_answers
 from deixis_evaluation.paper_masses import RULES, Answers, answers, conflict, dempster, largest_focals, sources
 from deixis_evaluation.paper_rooms import ROOM_A, ROOM_B, ROOM_C, ROOMS, Room
 from deixis_evaluation.paper_simulation import PART, Simulation, Study
@@ -244,6 +245,37 @@ def test_our_rules_name_more_in_the_rooms_a_and_b() -> None:
         gains[room.name] = (by_mode["deixis"].cors - by_mode["paper"].cors) / trials
     assert gains["B"] > 0.05
     assert gains["A"] > 0.02  # 4 points at most: the paper's rules name 96 % there
+
+
+def test_nobody_names_more_than_the_ideal_observer_of_the_same_readings_who_is_as_sure_as_right() -> None:
+    trials = made(ROOM_B, 20_000, mismatch=0.0)
+    for readings in (PAPERS, OURS):
+        ideal = ideal_answers(trials, FIGURE, DEIXIS, readings)
+        ours = DeixisModel.of(DEIXIS, FIGURE, readings).answers(trials)
+        meant = 1 << trials.arrangements.meant
+        right = ideal.sets == meant
+        assert right.mean() > (ours.sets == meant).mean() + 0.02
+        assert right.mean() == pytest.approx(ideal.belief.mean(), abs=0.006)
+        doubtful = ideal.belief < 0.7
+        assert right[doubtful].mean() == pytest.approx(ideal.belief[doubtful].mean(), abs=0.03)
+
+
+def test_the_ideal_observer_goes_by_bayes_rule() -> None:
+    trials = made(ROOM_B, 200, mismatch=0.0)
+    ideal, table = ideal_answers(trials, FIGURE, PAPER, PAPERS), hand_shares(PAPER)
+    for trial in range(len(trials)):
+        gesture, yaw = int(trials.gesture[trial]), int(trials.yaw[trial])
+        chances = {}
+        for poi in np.flatnonzero(trials.arrangements.visible[trial]):
+            bearing = trials.arrangements.bearing_deg[trial, poi : poi + 1]
+            chances[1 << int(poi)] = table[gesture, regions(bearing, PAPER)[0]] * FIGURE.distributions(bearing)[yaw, 0]
+        assert chances[int(ideal.sets[trial])] == max(chances.values())
+        assert ideal.belief[trial] == pytest.approx(max(chances.values()) / sum(chances.values()))
+
+
+def test_in_room_a_five_points_more_than_the_papers_rules_are_not_to_be_had() -> None:
+    by_mode = Simulation(Study(40_000, seed=1, mode="deixis")).run(ROOM_A, 0).by_mode
+    assert by_mode["paper"].cors < by_mode["deixis"].cors < by_mode["ideal"].cors < by_mode["paper"].cors + 0.045 * 40_000
 
 
 def test_our_rules_are_hardly_ever_sure_and_wrong_where_a_fifth_of_the_heads_look_at_the_robot() -> None:

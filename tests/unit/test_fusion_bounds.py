@@ -65,15 +65,17 @@ def core(pois: list[Poi], **config: Any) -> Fusion:
     return fusion
 
 
-def point(fusion: Fusion, persons: int, frames: int = 2, run: int = 1) -> tuple[list[Belief], list[Target]]:
-    """So many persons in one place point to their left for so many frames; then they are gone."""
+def point(
+    fusion: Fusion, persons: int, frames: int = 2, run: int = 1, hand: dict[str, Any] | None = None
+) -> tuple[list[Belief], list[Target]]:
+    """So many persons in one place point to their left for so many frames, or do with the `hand` what is said."""
     beliefs, targets = [], []
     width = 280 * FACE_WIDTH_M
     for seq in range(frames):
         about: dict[str, Any] = {"run": run, "seq": seq, "stamp_ns": 10**12 + seq * 33_333_333, "instance": "i" * 60}
         face = {"kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240), "velocity_px_s": (0, 0)}
         faces = [face | {"track_id": n, "person_id": n, "bbox_px": (320 - width / 2, 215, width, 60)} for n in range(persons)]
-        hand = {"phase": "stroke", "gesture": "point_left", "bearing_deg": 60, "bearing_sigma_deg": 10}
+        hand = hand or {"phase": "stroke", "gesture": "point_left", "bearing_deg": 60, "bearing_sigma_deg": 10}
         pose = {"status": "out_of_range", "side": "left"}
         belief, told = fusion.answer(
             JoinedFrame(
@@ -110,6 +112,25 @@ def test_belief_and_target_stay_below_a_mebibyte_with_all_pois_and_all_persons(r
     assert max(len(codec.encode(belief)) for belief in beliefs) < LIMIT
     assert max(len(codec.encode(target)) for target in targets) < LIMIT
     assert all(len(target.reason) <= 2000 for target in targets)
+
+
+@pytest.mark.parametrize("rules", ["paper", "deixis"])
+def test_a_belief_is_small_where_nobody_points_or_nobody_is_there(rules: str) -> None:
+    fusion = core(many(10_000), rules=rules)
+    (*_, resting), told = point(fusion, 1, hand={"phase": "idle", "gesture": "none"})
+    assert (len(resting.persons[0].pois), resting.persons[0].pois_total, told) == (16, 10_000, [])
+    assert len(codec.encode(resting)) < 1 << 14  # ids as long as they may be
+    (*_, alone), _ = point(fusion, 0, run=2)
+    assert len(codec.encode(alone)) < 300
+
+
+def test_in_paper_mode_the_robot_must_see_a_poi_as_well() -> None:
+    behind = [Poi(poi_id="seen", position_m=(2, -2, 1.3)), Poi(poi_id="hidden", position_m=(2, 2, 1.3))]
+    for rules, seen in (("paper", {"seen"}), ("deixis", {"seen", "hidden"})):
+        fusion = core(behind, rules=rules)
+        fusion.set_walls([((0.3, 0.1), (0.3, 3.0))])
+        (*_, belief), _ = point(fusion, 1)
+        assert {row.poi_id for row in belief.persons[0].pois} == seen
 
 
 def candidates(count: int) -> list[Candidate]:
@@ -247,6 +268,16 @@ def test_state_tells_of_the_poi_asked_for_that_it_is_behind_a_wall(tmp_path: Pat
     assert ([told.poi_id for told in person.excluded], person.excluded_total) == ([hidden], 13)
     (person,) = desk.state(poi=seen).persons
     assert (person.excluded, [row.poi_id for row in person.pois]) == ([], [seen])
+
+
+def test_state_says_why_in_words_of_each_person_and_a_belief_does_not(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "pois.sqlite", many(40))
+    beliefs, _ = point(desk.fusion, 1)
+    (person,) = desk.state().persons
+    assert person.reason.startswith(
+        "The person points to the left with a hand (about 60 +- 10 deg) and the head is turned far left"
+    )
+    assert beliefs[-1].persons[0].reason == ""
 
 
 def test_person_asks_for_one_person(full: Desk) -> None:

@@ -45,20 +45,13 @@ def test_discounting_is_the_exact_one(assignment: BeliefAssignment, rate: float)
     same(MassVector.of(assignment).discounted(rate), assignment.discounted(rate))
 
 
-@given(assignments(), assignments(), st.floats(0, 1))
-def test_a_mixture_has_a_share_of_each(first: BeliefAssignment, second: BeliefAssignment, share: float) -> None:
-    mixed = MassVector.of(first).mixed(MassVector.of(second), share)
-    expected = share * np.array(first.pignistic()) + (1 - share) * np.array(second.pignistic())
-    assert mixed.pignistic() == pytest.approx(expected, abs=1e-12)
-
-
 @given(assignments(1), assignments(1))
 def test_of_one_hypothesis_all_is_known_and_nothing(first: BeliefAssignment, second: BeliefAssignment) -> None:
     assert combine(MassVector.of(first), MassVector.of(second)).belief.unknown == 1
 
 
 def test_total_conflict_is_vacuous_belief() -> None:
-    one, other = MassVector(np.array([1.0, 0.0])), MassVector(np.array([0.0, 1.0]))
+    one, other = (MassVector.normalised(np.array(single)) for single in ([1.0, 0.0], [0.0, 1.0]))
     assert combine(one, other).conflict == 1
     assert combine(one, other).belief.unknown == 1
 

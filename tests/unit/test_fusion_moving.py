@@ -19,7 +19,7 @@ from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import PersonPlace
 from deixis_fusion.robust import median_angle
 from deixis_fusion.sight import Lookout, Points
-from deixis_fusion.views import MOST_VIEWS, last_place, views_of
+from deixis_fusion.views import MOST_VIEWS, last_place, parts_of, views_of
 from deixis_fusion.visibility import Walls
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
@@ -175,7 +175,7 @@ def test_angles_are_one_cluster_wherever_the_circle_is_cut() -> None:
 
 def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
     weighed = Frames.of([sample(i, 180, 60, person=(0.0, 0.05 * i)) for i in range(150)])
-    views = views_of(weighed, hand_over(weighed), head_over(weighed))
+    views = views_of(parts_of(weighed), hand_over(weighed), head_over(weighed))
     assert 2 < len(views) <= MOST_VIEWS
     assert sum(view.hand_share for view in views) == pytest.approx(1)
     assert sum(view.head_share for view in views) == pytest.approx(1)
@@ -183,7 +183,7 @@ def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
 
 def test_who_stands_is_seen_from_one_place() -> None:
     weighed = Frames.of([sample(i, i, 60 - i, person=(0.0, 0.01 * (i % 3))) for i in range(150)])
-    assert views_of(weighed, hand_over(weighed), head_over(weighed)) == ()
+    assert views_of(parts_of(weighed), hand_over(weighed), head_over(weighed)) == ()
 
 
 def test_of_a_walk_past_very_many_pois_few_cases_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,14 +191,14 @@ def test_of_a_walk_past_very_many_pois_few_cases_say_the_same(monkeypatch: pytes
     pois = [Poi(poi_id=f"p{i}", position_m=(*rng.uniform(-8, 8, 2), 1.2), extent_m=rng.uniform(0, 1)) for i in range(600)]
     weighed = Frames.of([sample(i, 180, 60 + 0.1 * i, person=(0.0, 0.03 * i)) for i in range(60)])
     hand, head = hand_over(weighed), head_over(weighed)
-    views = views_of(weighed, hand, head)
+    views = views_of(parts_of(weighed), hand, head)
     seen = Lookout(0.15).look(last_place(weighed.samples), Points.of(pois), Walls(()))  # type: ignore[arg-type]
     said = Witness("ok", "")
-    config = FusionConfig()
+    curves = weighing.SourceCurves(FusionConfig().hand, FusionConfig().head)
     monkeypatch.setattr(weighing, "MANY", 10_000)
-    every = weighing.weigh(Evidence(hand, said, head, said, views), seen, config.hand, config.head)
+    every = weighing.weigh(Evidence(hand, said, head, said, views), seen, curves)
     monkeypatch.setattr(weighing, "MANY", 100)
-    few = weighing.weigh(Evidence(hand, said, head, said, views), seen, config.hand, config.head)
+    few = weighing.weigh(Evidence(hand, said, head, said, views), seen, curves)
     assert len(views) > 2
     assert few.joint.shape == every.joint.shape
     assert few.chances(1.0) == pytest.approx(every.chances(1.0), abs=0.005)

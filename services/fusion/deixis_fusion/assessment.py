@@ -55,7 +55,7 @@ class Assessment(NamedTuple):
 
     def nearest_hidden(self, count: int) -> list[Poi]:
         """The first of the POIs that a wall hides, the nearest to the person first."""
-        if self.place is None:
+        if self.place is None or count == 0:
             return []
         here, hidden = self.place.position_m[:2], [self.pois[int(i)] for i in self.hidden]
         return heapq.nsmallest(count, hidden, key=lambda poi: math.dist(here, poi.position_m[:2]))

@@ -25,14 +25,15 @@ WHY = "a stage that spoke for more than one POI is gone"
 
 @dataclass(frozen=True)
 class _Heard:
-    """The last judgement with all the stages that had spoken: their names, how sure it was (what the likeliest POI, the two
-    likeliest, the three ... have together, of chances and of pignistic probabilities), and what it answered.
-    """
+    """The last judgement with all the stages that had spoken, and their names."""
 
     stages: frozenset[str]
-    chances: Values
-    pignistic: Values
-    poi_ids: frozenset[str]
+    judgement: Judgement
+
+    @property
+    def poi_ids(self) -> frozenset[str]:
+        """What it answered."""
+        return frozenset(self.judgement.poi_ids)
 
 
 class Caution:
@@ -51,9 +52,7 @@ class Caution:
         heard = self._heard
         if heard is not None and any(name in heard.stages and _is_gone(evidence, name) for name in ("gesture", "headpose")):
             return _no_surer(judgement, heard)
-        self._heard = _Heard(
-            speaking, _together(judgement.chances), _together(judgement.pignistic), frozenset(judgement.poi_ids)
-        )
+        self._heard = _Heard(speaking, judgement)
         return judgement
 
 
@@ -72,9 +71,9 @@ def _no_surer(judgement: Judgement, heard: _Heard) -> Judgement:
     Both go linearly toward 1 / n. So neither is the credible set smaller. All that was answered before, still is.
     """
     even = 1 / len(judgement.seen)
-    rate = _rate(judgement.chances, heard.chances)
+    rate = _rate(judgement.chances, _together(heard.judgement.chances))
     chances = (1 - rate) * judgement.chances + rate * even
-    belief = judgement.combination.belief.discounted(_rate(judgement.pignistic, heard.pignistic))
+    belief = judgement.combination.belief.discounted(_rate(judgement.pignistic, _together(heard.judgement.pignistic)))
     weakened = replace(judgement, chances=chances, combination=Combined(belief, judgement.combination.conflict))
     return replace(weakened, choice=_no_narrower(weakened, heard))
 

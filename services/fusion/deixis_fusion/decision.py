@@ -13,6 +13,7 @@ import numpy.typing as npt
 from .belief import BeliefAssignment, Combination, combine, vacuous
 from .evidence import Evidence, HandObservation, HeadObservation
 from .mass_vector import Combined, MassVector
+from .sight import ids_at
 from .visibility import Candidate
 
 Values = npt.NDArray[np.float64]
@@ -66,7 +67,7 @@ class Judgement:
     @property
     def poi_ids(self) -> tuple[str, ...]:
         """The answer, best first."""
-        return tuple(self.seen[i].poi.poi_id for i in self.choice.hypotheses)
+        return tuple(ids_at(self.seen, self.choice.hypotheses))
 
 
 class Rules(Protocol):

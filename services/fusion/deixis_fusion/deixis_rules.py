@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +23,14 @@ from .mass_vector import Flags, MassVector, combine
 from .pointing import Region
 from .sight import Sight
 from .visibility import Candidate
-from .weighing import Weighing, weigh
+from .weighing import SourceCurves, Weighing, weigh
 
 Values = npt.NDArray[np.float64]
 POSSIBILITY_LEVELS = 5
 # A source whose likelihoods differ by less than this part of the largest tells nothing.
 TOLD = 0.1
+# Likelihoods that sum to less are none.
+LEAST = 1e-300
 NOTHING_TOLD = "nothing was observed that tells the POIs apart"
 
 
@@ -43,7 +46,7 @@ class DeixisRules:
     def judge(self, seen: Sequence[Candidate], evidence: Evidence) -> Judgement:
         """Weigh, and answer. `seen` is not empty."""
         sight = Sight.of(seen)
-        weighed = weigh(evidence, sight, self.hand_config, self.head_config, self.confusion)
+        weighed = weigh(evidence, sight, self.curves)
         hand, head = MassVector.vacuous(len(sight)), MassVector.vacuous(len(sight))
         if evidence.hand is not None:
             hand = hand_masses(evidence.hand, weighed.hand, sight, self.hand_config, self.confusion)
@@ -53,6 +56,11 @@ class DeixisRules:
         choice = self.choose(weighed, chances, evidence)
         combined, conflict = combine(hand, head), weighed.contour_conflict
         return Judgement(sight, hand, head, combined, chances, choice, conflict, self.answer.credible)
+
+    @cached_property
+    def curves(self) -> SourceCurves:
+        """What hand and head tell, kept from frame to frame."""
+        return SourceCurves(self.hand_config, self.head_config, self.confusion)
 
     def choose(self, weighed: Weighing, chances: Values, evidence: Evidence) -> Choice:
         """The likeliest POIs, unless nothing was told, hand and head contradict each other, or no POI fits, or too many do."""
@@ -94,17 +102,31 @@ def hand_masses(
     Without a bearing and with hard borders the single masses of a region sum to its mass by eq. 16, so the refinement adds
     what the bearing tells and nothing else.
     """
-    single = MassVector.normalised(likelihoods)
     regions = _regions(hand, seen.bearings.likeliest, config, confusion)
-    return single.mixed(regions, config.refinement).discounted(config.discount)
+    kept = 1 - config.discount
+    of_single, of_regions = kept * config.refinement, kept * (1 - config.refinement)
+    total = sum(weight for _, weight in regions)
+    sets = [(flags, of_regions * weight / total) for flags, weight in regions]
+    everything = np.ones(len(likelihoods), dtype=np.bool_)
+    single = of_single / max(LEAST, float(likelihoods.sum())) * likelihoods
+    return MassVector.normalised(single, [*sets, (everything, config.discount)])
 
 
-def _regions(hand: HandObservation, bearings: Values, config: HandConfig, confusion: HandConfusion) -> MassVector:
-    """Eq. 16: the sets of POIs on the left, on the right and in the centre; P(G) is the share of the POIs in region G."""
-    beside = (np.abs(bearings) >= config.min_deg) & (np.abs(bearings) <= config.max_deg)
+def _regions(
+    hand: HandObservation, bearings: Values, config: HandConfig, confusion: HandConfusion
+) -> Sequence[tuple[Flags, float]]:
+    """Eq. 16: the sets of POIs on the left, on the right and in the centre with weights; P(G) is the share of the POIs in G.
+
+    All POIs, where none of the regions with POIs can have shown this gesture.
+    """
+    size = np.abs(bearings)
+    beside = (size >= config.min_deg) & (size <= config.max_deg)
     regions: dict[Region, Flags] = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
-    weights = [(flags, confusion.share(hand.gesture, name) * float(flags.mean())) for name, flags in regions.items()]
-    return MassVector.normalised(np.zeros(len(bearings)), weights)
+    count = len(bearings)
+    weights = [
+        (flags, confusion.share(hand.gesture, name) * np.count_nonzero(flags) / count) for name, flags in regions.items()
+    ]
+    return weights if any(weight for _, weight in weights) else [(np.ones(count, dtype=np.bool_), 1.0)]
 
 
 def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config: HeadConfig) -> MassVector:
@@ -116,8 +138,10 @@ def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config
     told = np.maximum(0.0, likelihoods - floor)
     if head.yaw_deg is None:
         return _out_of_range(told, floor).discounted(config.discount)
-    everything = np.ones(len(likelihoods), dtype=np.bool_)
-    return MassVector.normalised(told / len(told), [(everything, floor)]).discounted(config.discount)
+    single = told / len(told)
+    kept = (1 - config.discount) / max(LEAST, float(single.sum()) + floor)
+    everything = np.ones(len(told), dtype=np.bool_)
+    return MassVector.normalised(kept * single, [(everything, kept * floor + config.discount)])
 
 
 def _out_of_range(possible: Values, floor: float) -> MassVector:

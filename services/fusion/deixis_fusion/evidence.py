@@ -9,14 +9,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from deixis_schemas.messages import Gesture, HeadPose, Side, SourceStatus
 
 from .localisation import PersonPlace, wrapped_deg
 from .pointing import PointingGesture
-
-Values = npt.NDArray[np.float64]
 
 NAN = math.nan
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
@@ -93,10 +89,10 @@ class Sample:
         return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
 
     @cached_property
-    def curve(self) -> Values | None:
-        """The gesture stage's likelihood of bearings, where it tells it."""
+    def curve(self) -> bytes:
+        """The gesture stage's likelihood of bearings, packed as `row`; empty where it does not tell it."""
         told = self.gesture.bearing_likelihood if self.gesture is not None else ()
-        return np.array(told) if told else None
+        return struct.pack(f"{len(told)}d", *told)
 
 
 def _place_in(all_there_are: Sequence[str], one: str | None) -> float:
@@ -124,6 +120,10 @@ class HandObservation:
     hand: Side | None = None
     likelihood: tuple[float, ...] = ()
     mirror: tuple[float, float] | None = None
+
+    def __hash__(self) -> int:
+        # Kept curves are looked up by it, for each view in each frame: without the 72 values of the likelihood.
+        return hash((self.gesture, self.bearing_deg, self.bearing_sigma_deg, self.agreement, self.hand))
 
     @property
     def mirror_deg(self) -> float | None:

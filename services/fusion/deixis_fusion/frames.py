@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
+from deixis_schemas.messages import BEARINGS
 
 from .evidence import ROW, Sample
 
@@ -53,6 +55,11 @@ class Frames:
     def column(self, name: str) -> Values:
         """One of the numbers, of each frame (n); not a number where a frame does not tell."""
         return self.table[:, ROW[name]]
+
+    def curves(self, which: Flags) -> Values:
+        """The likelihoods of bearings of those of the frames (m, `BEARINGS`), each of which tells one."""
+        told = b"".join([sample.curve for sample in compress(self.samples, which.tolist())])
+        return np.frombuffer(told).reshape(-1, BEARINGS)
 
     def placed(self) -> Frames:
         """Those of which is known where the person stood."""

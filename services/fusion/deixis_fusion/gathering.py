@@ -12,7 +12,7 @@ from .hand_evidence import hand_over
 from .head_evidence import head_now, head_over
 from .joining import GESTURE, HEADPOSE, JoinedFrame
 from .robust import weigh
-from .views import last_place, views_of
+from .views import last_place, parts_of, views_of
 
 StageStatus = tuple[SourceStatus, str]
 
@@ -50,22 +50,24 @@ def gather(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witnes
 def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Witness], config: EpisodesConfig) -> Evidence:
     """A stage that is dead counts for nothing from then on. One that is only late counts by what it said a moment ago."""
     gesture, headpose = stages[GESTURE], stages[HEADPOSE]
-    posed = [sample for sample in stroke if sample.pose is not None]
+    posed = next((sample for sample in reversed(stroke) if sample.pose is not None), None)
     frames, place = weigh(stroke, config.settle_s), last_place(stroke)
     axis_deg = place.axis_deg if place is not None else None
+    parts = parts_of(frames)
     hand, head = None, None
-    if _counts(gesture, stroke, latest, config):
-        hand = hand_over(frames, axis_deg)
+    if _counts(gesture, stroke[-1], latest, config):
+        hand = hand_over(frames, axis_deg, with_curve=not parts)
         gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
     if _counts(headpose, posed, latest, config):
         head = head_over(frames, axis_deg)
-        headpose = _head_witness(head, stroke[-1].pose, headpose, posed[-1].stamp_ns if posed else None)
-    return Evidence(hand, gesture, head, headpose, views_of(frames, hand, head))
+        headpose = _head_witness(head, stroke[-1].pose, headpose, posed.stamp_ns if posed else None)
+    return Evidence(hand, gesture, head, headpose, views_of(parts, hand, head))
 
 
-def _counts(stage: Witness, told: Sequence[Sample], latest: Sample, config: EpisodesConfig) -> bool:
+def _counts(stage: Witness, told: Sample | None, latest: Sample, config: EpisodesConfig) -> bool:
+    """Whether a stage counts that told something last in `told`."""
     if stage.status == "late":
-        return bool(told) and latest.at_ns - told[-1].at_ns <= config.max_evidence_age_s * 1e9
+        return told is not None and latest.at_ns - told.at_ns <= config.max_evidence_age_s * 1e9
     return stage.status == "ok"
 
 

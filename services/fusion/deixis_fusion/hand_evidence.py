@@ -18,8 +18,8 @@ DIRECTED_SHARE = 0.3
 SAME_AXIS_DEG = 1.0
 
 
-def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation | None:
-    """The pointing hand over a stroke; none without a pointing frame.
+def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = True) -> HandObservation | None:
+    """The pointing hand over a stroke; none without a pointing frame. On request without the likelihood of bearings.
 
     Bearings are from the direction `axis_deg` in the map, whichever way the camera was when each was seen; without it, from the
     direction to the camera in each frame.
@@ -36,7 +36,8 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
     told = own & frames.tells("bearing_deg")
     if not told.any():
         return HandObservation(gesture, agreement=agreement, hand=hand)
-    weights, turns, seen = frames.weights[told], frames.turns_to(axis_deg)[told], frames.column("bearing_deg")[told]
+    turns_of_all = frames.turns_to(axis_deg)
+    weights, turns, seen = frames.weights[told], turns_of_all[told], frames.column("bearing_deg")[told]
     mirrored, mirror = bool(majority(frames.column("mirrored")[told], weights)), None
     stated = median(frames.column("bearing_sigma_deg")[told], weights)
     if mirrored:
@@ -45,24 +46,28 @@ def hand_over(frames: Frames, axis_deg: float | None = None) -> HandObservation 
         other, spread_of_other = median_angle(180 - seen + turns, weights)
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
-    curve = _mean_curve(frames, told & frames.tells("has_curve"), axis_deg)
+    curve = _mean_curve(frames, told & frames.tells("has_curve"), turns_of_all) if with_curve else ()
     return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
 
 
-def _mean_curve(frames: Frames, told: Flags, axis_deg: float | None) -> tuple[float, ...]:
-    """Of these frames together: their mean, for they show nearly the same, and where they differ either may be right."""
-    curves = [frames.samples[i].curve for i in told.nonzero()[0].tolist()]
-    if not curves:
+def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, ...]:
+    """Of these frames together: their mean, for they show nearly the same, and where they differ either may be right.
+
+    `turns_deg` is added to the bearings of each frame. Those that turn alike are summed before they are turned.
+    """
+    if not told.any():
         return ()
-    weights, turns = frames.weights[told], frames.turns_to(axis_deg)[told]
-    turned = _turned(np.array(curves), np.round(turns / SAME_AXIS_DEG) * SAME_AXIS_DEG)
-    return tuple((weights @ turned / weights.sum()).tolist())
+    weights, curves = frames.weights[told], frames.curves(told)
+    steps = np.rint(turns_deg[told] / SAME_AXIS_DEG)
+    if not steps.any():
+        return tuple((weights @ curves / weights.sum()).tolist())
+    turns = np.array(sorted(set(steps.tolist())))
+    turned = _turned(np.where(steps == turns[:, None], weights, 0.0) @ curves, turns * SAME_AXIS_DEG)
+    return tuple((turned.sum(axis=0) / weights.sum()).tolist())
 
 
 def _turned(curves: Values, turns_deg: Values) -> Values:
     """Curves of bearings (m, n) with all bearings of each turned (m), on a line between their values."""
-    if not turns_deg.any():
-        return curves
     steps = np.arange(BEARINGS) - turns_deg[:, None] / BEARING_STEP_DEG
     below = np.floor(steps)
     share, place = steps - below, below.astype(np.intp)

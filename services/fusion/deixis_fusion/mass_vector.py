@@ -6,8 +6,11 @@ single POIs, on the three regions of eq. 16, on nested sets and on the whole fra
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +21,7 @@ from .belief import TOTAL_CONFLICT, BeliefAssignment, Combination, members
 Values = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
-Sets = Sequence[tuple[Flags, float]]
+Sets = list[tuple[Flags, float]]
 
 
 class Focal(NamedTuple):
@@ -30,41 +33,34 @@ class Focal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MassVector:
-    """m({i}) of each hypothesis in `single`; `sets` holds each larger set once, as flags of its members, with its mass."""
+    """m({i}) of each hypothesis in `single` (n); of larger sets, each once: flags of `members` (k, n) and `masses` (k)."""
 
     single: Values
-    sets: Sets = ()
+    members: Flags
+    masses: Values
 
     @staticmethod
     def normalised(single: Values, sets: Iterable[tuple[Flags, float]] = ()) -> MassVector:
         """The assignment proportional to these weights; vacuous where all are 0. Equal sets are added up."""
-        vector, larger = single.copy(), dict[bytes, tuple[Flags, float]]()
-        for flags, weight in sets:
-            count = int(np.count_nonzero(flags))
-            if count == 1:
-                vector[flags] += weight
-            elif count and weight > 0:
-                larger[flags.tobytes()] = (flags, larger.get(flags.tobytes(), (flags, 0.0))[1] + weight)
-        total = float(vector.sum()) + sum(weight for _, weight in larger.values())
-        if not (total > 0 and np.isfinite(total)):
-            return MassVector.vacuous(len(single))
-        return MassVector(vector / total, [(flags, weight / total) for flags, weight in larger.values()])
+        flags, weights = tuple(zip(*sets, strict=True)) or ((), ())
+        return _normalised(
+            single, np.array(flags, dtype=np.bool_).reshape(-1, len(single)), np.array(weights, dtype=np.float64)
+        )
 
     @staticmethod
     def vacuous(size: int) -> MassVector:
         """Total ignorance: m(X) = 1."""
-        return MassVector(np.ones(1)) if size == 1 else MassVector(np.zeros(size), [(np.ones(size, dtype=np.bool_), 1.0)])
+        larger = int(size > 1)
+        return MassVector(np.full(size, 1.0 - larger), np.ones((larger, size), dtype=np.bool_), np.ones(larger))
 
     @staticmethod
     def of(assignment: BeliefAssignment) -> MassVector:
         """The same assignment."""
-        sets = []
-        for subset, mass in assignment.masses.items():
-            if subset & (subset - 1):
-                flags = np.zeros(assignment.size, dtype=np.bool_)
-                flags[list(members(subset))] = True
-                sets.append((flags, mass))
-        return MassVector(np.array(assignment.singletons()), sets)
+        larger = {subset: mass for subset, mass in assignment.masses.items() if subset & (subset - 1)}
+        flags = np.zeros((len(larger), assignment.size), dtype=np.bool_)
+        for row, subset in zip(flags, larger, strict=True):
+            row[list(members(subset))] = True
+        return MassVector(np.array(assignment.singletons()), flags, np.array(list(larger.values()), dtype=np.float64))
 
     @property
     def size(self) -> int:
@@ -72,43 +68,53 @@ class MassVector:
         return len(self.single)
 
     @property
+    def sets(self) -> Sets:
+        """The larger sets, each with its mass."""
+        return list(zip(self.members, self.masses.tolist(), strict=True))
+
+    @cached_property
+    def sizes(self) -> Indices:
+        """How many members each of the larger sets has (k)."""
+        return np.asarray(self.members.sum(axis=1))
+
+    @cached_property
     def unknown(self) -> float:
         """m(X): the mass of the whole frame, which says nothing."""
-        if self.size == 1:
-            return float(self.single[0])
-        return sum(mass for flags, mass in self.sets if flags.all())
+        return float(self.single[0]) if self.size == 1 else float(self.masses[self.sizes == self.size].sum())
 
     def plausibilities(self) -> Values:
         """Pl({i}) of each hypothesis."""
-        sums = self.single.copy()
-        for flags, mass in self.sets:
-            sums[flags] += mass
-        return np.minimum(sums, 1.0)
+        return np.minimum(self.single + self.masses @ self.members, 1.0)
 
     def pignistic(self) -> Values:
         """BetP({i}) of each hypothesis: every set's mass shared equally among its members (Smets). Sums to 1."""
-        sums = self.single.copy()
-        for flags, mass in self.sets:
-            sums[flags] += mass / np.count_nonzero(flags)
-        return sums
+        return np.asarray(self.single + (self.masses / self.sizes) @ self.members)
+
+    def divided(self, total: float) -> MassVector:
+        """All masses divided by their total."""
+        return MassVector(self.single / total, self.members, self.masses / total)
 
     def discounted(self, rate: float) -> MassVector:
         """Shafer's discounting: keep 1 - rate of every mass, give `rate` to the whole frame."""
-        kept = [(flags, mass * (1 - rate)) for flags, mass in self.sets]
-        return MassVector.normalised(self.single * (1 - rate), [*kept, (np.ones(self.size, dtype=np.bool_), rate)])
-
-    def mixed(self, other: MassVector, share: float) -> MassVector:
-        """`share` of this one, the rest of the other."""
-        own = [(flags, mass * share) for flags, mass in self.sets]
-        theirs = [(flags, mass * (1 - share)) for flags, mass in other.sets]
-        return MassVector.normalised(share * self.single + (1 - share) * other.single, [*own, *theirs])
+        everything = np.ones((1, self.size), dtype=np.bool_)
+        sets, masses = np.concatenate([self.members, everything]), np.append(self.masses * (1 - rate), rate)
+        return _normalised(self.single * (1 - rate), sets, masses)
 
     def largest(self, count: int) -> list[Focal]:
         """The sets of largest mass, single hypotheses among them."""
-        found = [Focal(np.flatnonzero(flags), mass) for flags, mass in self.sets if mass > 0]
-        best = np.argsort(-self.single, kind="stable")[:count]
-        found += [Focal(np.array([i]), float(self.single[i])) for i in best if self.single[i] > 0]
-        return sorted(found, key=lambda focal: (-focal.mass, len(focal.members), focal.members[0]))[:count]
+        single, masses = self.single, self.masses.tolist()
+        if len(single) > count:
+            candidates = (single >= np.partition(single, -count)[-count]).nonzero()[0]
+        else:
+            candidates = np.arange(len(single))
+        best = candidates[(-single[candidates]).argsort(kind="stable")[:count]]
+        alone = zip(best.tolist(), single[best].tolist(), strict=True)
+        found = [(-mass, 1, i, best[k : k + 1]) for k, (i, mass) in enumerate(alone)]
+        for flags, mass in zip(self.members, masses, strict=True):
+            named = flags.nonzero()[0]
+            found.append((-mass, len(named), int(named[0]), named))
+        found.sort(key=itemgetter(0, 1, 2))
+        return [Focal(named, -mass) for mass, _, _, named in found[:count] if mass < 0]
 
 
 class Combined(NamedTuple):
@@ -125,13 +131,34 @@ class Combined(NamedTuple):
 
 def combine(first: MassVector, second: MassVector) -> Combined:
     """Dempster's rule, eqs 13-15. Total conflict, which eq. 15 leaves undefined, gives vacuous belief and conflict 1."""
-    single = first.single * second.single
-    for flags, mass in second.sets:
-        single[flags] += first.single[flags] * mass
-    for flags, mass in first.sets:
-        single[flags] += second.single[flags] * mass
-    sets = [(flags & others, mass * other) for flags, mass in first.sets for others, other in second.sets]
-    agreement = float(single.sum()) + sum(mass for flags, mass in sets if flags.any())
+    for one, other in ((first, second), (second, first)):
+        if one.unknown == 1.0:
+            return Combined(other, 0.0)  # nobody pointed: ignorance beside what the head tells
+    single = first.single * (second.single + second.masses @ second.members) + second.single * (first.masses @ first.members)
+    sets = (first.members[:, None] & second.members).reshape(-1, first.size)
+    joint, agreement = _gathered(single, sets, np.multiply.outer(first.masses, second.masses).ravel())
     if agreement < TOTAL_CONFLICT:
         return Combined(MassVector.vacuous(first.size), 1.0)
-    return Combined(MassVector.normalised(single, sets), min(1.0, max(0.0, 1.0 - agreement)))
+    return Combined(joint.divided(agreement), min(1.0, max(0.0, 1.0 - agreement)))
+
+
+def _normalised(single: Values, sets: Flags, weights: Values) -> MassVector:
+    """See `MassVector.normalised`; the sets as flags (k, n)."""
+    gathered, total = _gathered(single, sets, weights)
+    return gathered.divided(total) if total > 0 and math.isfinite(total) else MassVector.vacuous(len(single))
+
+
+def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector, float]:
+    """These weights with equal sets added up, and their total. Sets without a member, or without weight, go."""
+    larger: dict[bytes, float] = {}
+    rows = []
+    for i, (size, weight) in enumerate(zip(sets.sum(axis=1).tolist(), weights.tolist(), strict=True)):
+        if size == 1:
+            single = single + weight * sets[i]
+        elif size and weight > 0:
+            key = sets[i].tobytes()
+            if key not in larger:
+                rows.append(i)
+            larger[key] = larger.get(key, 0.0) + weight
+    members = sets if len(rows) == len(sets) else sets[rows]
+    return MassVector(single, members, np.array([*larger.values()])), float(single.sum()) + sum(larger.values())

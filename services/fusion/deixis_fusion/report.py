@@ -7,27 +7,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
-from deixis_schemas import messages
-from deixis_schemas.messages import MAX_LISTED, MAX_TEXT, OfFrame, PersonBelief, Poi, PoiBelief, Producer, Target
+import numpy as np
+from deixis_schemas.messages import MAX_LISTED, MAX_TEXT, OfFrame, PersonBelief, Poi, Producer, Target
 
 from .assessment import Assessment
 from .decision import Judgement
 from .evidence import Witness
 from .mass_vector import MassVector
 from .reasons import cut, explain
-from .sight import bearings_at, poi_at
+from .sight import bearings_at, ids_at
 from .visibility import Candidate
 
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
 MAX_MEMBERS = 96
+# Parts of a message, which is made and validated at once, with all that is in it: one by one takes three times as long.
+Content = dict[str, object]
 BEHIND_A_WALL = "behind a wall"
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`. So many `excluded` ones are named."""
+    """Which POIs a message tells of: the `top` likeliest, or the one called `poi_id`.
+
+    So many `excluded` ones are named, and with any the reason in words; a Belief, which goes out with each frame, has neither.
+    """
 
     top: int
     poi_id: str | None = None
@@ -47,22 +53,24 @@ class PersonReport(NamedTuple):
         told = self.assessment
         place, judgement = told.place, told.judgement
         unplaced = told.pois if place is None else ()
-        return PersonBelief(
-            person_id=self.person_id,
-            position_m=place.position_m if place else None,
-            distance_m=place.distance_m if place else None,
-            pois=_rows(judgement, rows) if judgement else _vacuous_rows(unplaced, rows),
-            pois_total=len(judgement.seen) if judgement else len(unplaced),
-            unknown=judgement.combination.belief.unknown if judgement else 1.0,
-            conflict=told.conflict,
-            contour_conflict=told.contour_conflict,
-            credible=_credible(told.judgement),
-            credible_total=len(told.judgement.credible) if told.judgement else 0,
-            excluded=_excluded(told, rows.poi_id, rows.excluded),
-            excluded_total=len(told.hidden) if rows.excluded else 0,
-            evidence=_evidence(told, self.now_ns),
-            episode_id=self.episode_id,
-        )
+        content: Content = {
+            "person_id": self.person_id,
+            "position_m": place.position_m if place else None,
+            "distance_m": place.distance_m if place else None,
+            "pois": _rows(judgement, rows) if judgement else _vacuous_rows(unplaced, rows),
+            "pois_total": len(judgement.seen) if judgement else len(unplaced),
+            "unknown": judgement.combination.belief.unknown if judgement else 1.0,
+            "conflict": told.conflict,
+            "contour_conflict": told.contour_conflict,
+            "credible": _credible(told.judgement),
+            "credible_total": len(told.judgement.credible) if told.judgement else 0,
+            "excluded": _excluded(told, rows.poi_id, rows.excluded),
+            "excluded_total": len(told.hidden) if rows.excluded else 0,
+            "evidence": _evidence(told, self.now_ns),
+            "reason": explain(told) if rows.excluded else "",
+            "episode_id": self.episode_id,
+        }
+        return PersonBelief.model_validate(content)
 
 
 @dataclass(frozen=True)
@@ -107,56 +115,55 @@ class TargetReport:
 # --- rows -------------------------------------------------------------------------------------------------------------
 
 
-def _rows(judgement: Judgement, rows: Rows) -> list[PoiBelief]:
-    """The standing of the POIs asked for, best first."""
+def _rows(judgement: Judgement, rows: Rows) -> list[Content]:
+    """The standing of the POIs asked for, best first: `PoiBelief`."""
     seen, chosen = judgement.seen, judgement.order
     if rows.poi_id is not None:
-        chosen = chosen[[poi_at(seen, i).poi_id == rows.poi_id for i in chosen.tolist()]]
+        chosen = chosen[[poi_id == rows.poi_id for poi_id in ids_at(seen, chosen)]]
     chosen = chosen[: rows.top]
     standing = (judgement.combination.belief.single, judgement.plausibilities, judgement.pignistic, judgement.chances)
     columns = [values[chosen].tolist() for values in standing]
-    told = zip(chosen.tolist(), *columns, bearings_at(seen, chosen), strict=True)
+    told = zip(ids_at(seen, chosen), *columns, bearings_at(seen, chosen), strict=True)
     return [
-        PoiBelief(
-            poi_id=poi_at(seen, i).poi_id,
-            mass=alone,
-            belief=alone,
-            plausibility=plausibility,
-            pignistic=pignistic,
-            probability=chance,
-            bearing_deg=bearing,
-        )
-        for i, alone, plausibility, pignistic, chance, bearing in told
+        {
+            "poi_id": poi_id,
+            "mass": alone,
+            "belief": alone,
+            "plausibility": plausibility,
+            "pignistic": pignistic,
+            "probability": chance,
+            "bearing_deg": bearing,
+        }
+        for poi_id, alone, plausibility, pignistic, chance, bearing in told
     ]
 
 
-def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[PoiBelief]:
+def _vacuous_rows(pois: Sequence[Poi], rows: Rows) -> list[Content]:
     """POIs with nothing known of any: for a person whose place is unknown."""
     asked = [poi for poi in pois if rows.poi_id in (None, poi.poi_id)][: rows.top]
     even = 1 / max(1, len(pois))
-    return [
-        PoiBelief(poi_id=poi.poi_id, mass=0.0, belief=0.0, plausibility=1.0, pignistic=even, probability=even) for poi in asked
-    ]
+    shares = {"mass": 0.0, "belief": 0.0, "plausibility": 1.0, "pignistic": even, "probability": even}
+    return [{"poi_id": poi.poi_id, **shares} for poi in asked]
 
 
 def _credible(judgement: Judgement | None) -> list[str]:
     """The first of the credible set."""
-    return [poi_at(judgement.seen, i).poi_id for i in judgement.credible[:MAX_LISTED]] if judgement else []
+    return ids_at(judgement.seen, judgement.credible[:MAX_LISTED]) if judgement else []
 
 
-def _excluded(told: Assessment, poi_id: str | None, most: int) -> list[messages.Excluded]:
+def _excluded(told: Assessment, poi_id: str | None, most: int) -> list[Content]:
     """The nearest of the POIs that do not come into question, or the one asked for if it is among them."""
     if poi_id is None:
         named = told.nearest_hidden(most)
     else:
         named = [told.pois[i] for i in told.hidden.tolist() if told.pois[i].poi_id == poi_id][:most]
-    return [messages.Excluded(poi_id=poi.poi_id, reason=BEHIND_A_WALL) for poi in named]
+    return [{"poi_id": poi.poi_id, "reason": BEHIND_A_WALL} for poi in named]
 
 
 # --- evidence ---------------------------------------------------------------------------------------------------------
 
 
-def _evidence(told: Assessment, now_ns: int | None) -> list[messages.Evidence]:
+def _evidence(told: Assessment, now_ns: int | None) -> list[Content]:
     """What each source contributed; the robot's pose, which places everything, is named only where it is in doubt."""
     judgement, evidence = told.judgement, told.evidence
     listed = [
@@ -170,26 +177,30 @@ def _evidence(told: Assessment, now_ns: int | None) -> list[messages.Evidence]:
 
 def _source(
     source: str, witness: Witness, assignment: MassVector | None, judgement: Judgement | None, now_ns: int | None
-) -> messages.Evidence:
+) -> Content:
     age_ms = None
     if witness.stamp_ns is not None:
         age_ms = 0.0 if now_ns is None else max(0.0, (now_ns - witness.stamp_ns) / 1e6)
-    return messages.Evidence(
-        source=source,
-        producer=witness.producer,
-        status=witness.status,
-        observed=cut(witness.observed, MAX_TEXT),
-        age_ms=age_ms,
-        weight=1.0 - assignment.unknown if assignment else 0.0,
-        masses=_focal_sets(assignment, judgement.seen) if assignment and judgement else [],
-    )
+    return {
+        "source": source,
+        "producer": witness.producer,
+        "status": witness.status,
+        "observed": cut(witness.observed, MAX_TEXT),
+        "age_ms": age_ms,
+        "weight": 1.0 - assignment.unknown if assignment else 0.0,
+        "masses": _focal_sets(assignment, judgement.seen) if assignment and judgement else [],
+    }
 
 
-def _focal_sets(assignment: MassVector, seen: Sequence[Candidate]) -> list[messages.FocalSet]:
+def _focal_sets(assignment: MassVector, seen: Sequence[Candidate]) -> list[Content]:
     """The sets of largest mass, each with its first members."""
-    sets, left = [], MAX_MEMBERS
-    for focal in assignment.largest(MAX_LISTED):
-        named = [poi_at(seen, i).poi_id for i in focal.members[: min(left, MAX_LISTED)].tolist()]
-        left -= len(named)
-        sets.append(messages.FocalSet(poi_ids=named, size=len(focal.members), mass=focal.mass))
-    return sets
+    largest, left = assignment.largest(MAX_LISTED), MAX_MEMBERS
+    named = []
+    for focal in largest:
+        named.append(focal.members[: min(left, MAX_LISTED)])
+        left -= len(named[-1])
+    ids = iter(ids_at(seen, np.concatenate(named)))
+    return [
+        {"poi_ids": list(islice(ids, len(of))), "size": len(focal.members), "mass": focal.mass}
+        for focal, of in zip(largest, named, strict=True)
+    ]

@@ -130,9 +130,11 @@ class Sight(Sequence[Candidate]):
         return (self[i] for i in range(len(self)))
 
 
-def poi_at(seen: Sequence[Candidate], i: int) -> Poi:
-    """The i-th POI of those that are seen; of a sight without a candidate made for it."""
-    return seen.poi(i) if isinstance(seen, Sight) else seen[i].poi
+def ids_at(seen: Sequence[Candidate], chosen: Sequence[int] | Indices) -> list[str]:
+    """The ids of some of the POIs that are seen; of a sight without candidates made for them."""
+    if isinstance(seen, Sight):
+        return [seen.points.pois[place].poi_id for place in seen.chosen[np.asarray(chosen, dtype=np.intp)].tolist()]
+    return [seen[i].poi.poi_id for i in chosen]
 
 
 def bearings_at(seen: Sequence[Candidate], chosen: Indices) -> list[float]:
@@ -184,16 +186,21 @@ class _Turned(NamedTuple):
     @staticmethod
     def of(places: Sequence[PersonPlace], points: Points, index: Indices) -> _Turned:
         """These POIs for persons there."""
-        camera = np.array([place.camera_m[:2] for place in places])
-        back = np.array([place.position_m[:2] for place in places]) - camera
-        distance = np.hypot(back[:, 0], back[:, 1])[:, None]
-        ways = np.divide(-back, distance, out=np.tile((1.0, 0.0), (len(places), 1)), where=distance > 0)
-        cos, sin = ways[:, :1], ways[:, 1:]
-        xy = points.xy[index]
-        x, y = xy[:, 0] - camera[:, :1], xy[:, 1] - camera[:, 1:]
+        camera_x, camera_y, cos, sin, distance = np.array([_axis(place) for place in places]).T[:, :, None]
+        xyz = points.xyz[index]
+        x, y = xyz[:, 0] - camera_x, xyz[:, 1] - camera_y
         ahead, left = cos * x + sin * y, cos * y - sin * x
         away = np.maximum(np.hypot(ahead + distance, left), LEAST_AWAY_M)
         return _Turned(ahead, left, away, points.extent[index], distance)
+
+
+def _axis(place: PersonPlace) -> tuple[float, float, float, float, float]:
+    """Where the camera is, the direction to it from the person as a unit vector, and how far away it is; seen from above."""
+    (x, y), (eye_x, eye_y) = place.camera_m[:2], place.position_m[:2]
+    distance = math.hypot(x - eye_x, y - eye_y)
+    if distance <= 0:
+        return x, y, 1.0, 0.0, 0.0
+    return x, y, (x - eye_x) / distance, (y - eye_y) / distance, distance
 
 
 def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearings:

@@ -6,7 +6,6 @@ person moves as well, the stroke is cut into parts in each of which the person h
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -19,6 +18,7 @@ from .frames import Frames
 from .hand_evidence import hand_over
 from .head_evidence import head_over
 from .localisation import PersonPlace
+from .pointing import PointingGesture
 
 # So far a POI that is 2 m off moves by 7 degrees, about what a pointing arm tells.
 APART_M = 0.25
@@ -30,18 +30,22 @@ def last_place(samples: Sequence[Sample]) -> PersonPlace | None:
     return next((sample.place for sample in reversed(samples) if sample.place is not None), None)
 
 
-def views_of(frames: Frames, hand: HandObservation | None, head: HeadObservation | None) -> tuple[View, ...]:
-    """The parts of a stroke of which hand and head are known as a whole; none where it was seen from one place."""
+def parts_of(frames: Frames) -> list[Frames]:
+    """The parts of a stroke, in each of which the person hardly moved; none where it was seen from one place."""
     placed, apart_m = frames.placed(), APART_M
     x, y = placed.column("x_m"), placed.column("y_m")
     if not len(placed) or np.hypot(x - x[0], y - y[0]).max() <= apart_m:
-        return ()
+        return []
     spots = list(zip(x.tolist(), y.tolist(), strict=True))
     while len(starts := _starts(spots, apart_m)) > MOST_VIEWS:
         apart_m *= 1.5
     if len(starts) < 2:
-        return ()
-    parts = [placed[start:stop] for start, stop in pairwise([*starts, len(placed)])]
+        return []
+    return [placed[start:stop] for start, stop in pairwise([*starts, len(placed)])]
+
+
+def views_of(parts: Sequence[Frames], hand: HandObservation | None, head: HeadObservation | None) -> tuple[View, ...]:
+    """What these parts of a stroke show, of which hand and head are known as a whole."""
     return tuple(_shared([_view(part, hand, head) for part in parts], parts))
 
 
@@ -53,7 +57,7 @@ def _starts(spots: Sequence[tuple[float, float]], apart_m: float) -> list[int]:
     starts: list[int] = []
     began_x, began_y = 0.0, 0.0
     for i, (x, y) in enumerate(spots):
-        if starts and math.hypot(x - began_x, y - began_y) <= apart_m:
+        if starts and (x - began_x) * (x - began_x) + (y - began_y) * (y - began_y) <= apart_m * apart_m:
             continue
         starts.append(i)
         began_x, began_y = x, y
@@ -63,21 +67,22 @@ def _starts(spots: Sequence[tuple[float, float]], apart_m: float) -> list[int]:
 
 
 def _view(part: Frames, hand: HandObservation | None, head: HeadObservation | None) -> View:
-    """What a part shows; the gesture, and how far all agree, is that of the whole stroke."""
-    of_hand, of_head = _shown(tuple(part.samples), tuple(part.weights.tolist()))
-    if hand is not None and of_hand is not None:
-        of_hand = replace(of_hand, gesture=hand.gesture, agreement=hand.agreement)
-    if head is not None and of_head is not None:
-        of_head = replace(of_head, agreement=head.agreement)
-    return View(of_hand if hand else None, of_head if head else None, last_place(part.samples))
+    """What a part shows; the gesture is that of the whole stroke, and how far its frames agree is told there alone."""
+    seen = _shown(tuple(part.samples), tuple(part.weights.tolist()), hand.gesture if hand else None)
+    return seen if head is not None else seen._replace(head=None)
 
 
 # Of a walk only the last part changes from frame to frame.
 @lru_cache(maxsize=8 * MOST_VIEWS)
-def _shown(samples: tuple[Sample, ...], weights: tuple[float, ...]) -> tuple[HandObservation | None, HeadObservation | None]:
+def _shown(samples: tuple[Sample, ...], weights: tuple[float, ...], gesture: PointingGesture | None) -> View:
     frames, place = Frames.of(samples, np.array(weights)), last_place(samples)
     axis_deg = place.axis_deg if place is not None else None
-    return hand_over(frames, axis_deg), head_over(frames, axis_deg)
+    hand, head = hand_over(frames, axis_deg) if gesture else None, head_over(frames, axis_deg)
+    return View(
+        replace(hand, gesture=gesture, agreement=1.0) if hand and gesture else None,
+        replace(head, agreement=1.0) if head else None,
+        place,
+    )
 
 
 def _shared(views: Sequence[View], parts: Sequence[Frames]) -> list[View]:

@@ -47,10 +47,10 @@ class Walls:
         hidden = np.zeros(len(points), dtype=np.bool_)
         if not len(self._from) or not len(points):
             return hidden
-        ways = points @ np.array([1, 1j]) - complex(*eye)
+        ways = points[:, 0] - eye[0] + 1j * (points[:, 1] - eye[1])
         first, second = self._from - complex(*eye), self._to - complex(*eye)
         angles = np.angle(ways)
-        order = np.argsort(angles, kind="stable")
+        order = np.argsort(angles)
         wall, rank = _pairs(first, second, angles[order])
         point = order[rank]
         reach = np.abs(ways[point]) - clearance_m

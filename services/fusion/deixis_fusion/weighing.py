@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +21,16 @@ from .sight import CASES, FEW_BELOW_DEG, FEW_CASES, Indices, Sight
 
 Values = npt.NDArray[np.float64]
 
+Seen = TypeVar("Seen", HandObservation, HeadObservation)
+
 NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 4096
 MANY = 500
 
 
-class Weighing(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Weighing:
     """Of each POI in sight (n): the likelihood of the hand, of the head and of both, and how well it fits.
 
     `hand` and `head` are each on their own the mean over the cases of `sight.py`; `joint` is the mean of their product, for
@@ -42,7 +45,7 @@ class Weighing(NamedTuple):
     fit: Values
     head_floor: float = 0.0
 
-    @property
+    @cached_property
     def contour_conflict(self) -> float:
         """1 - max_i (L1_i / max L1) (L2_i / max L2): 0 where one POI is the likeliest of both, at any number of POIs.
 
@@ -57,32 +60,54 @@ class Weighing(NamedTuple):
         return np.asarray(weights / weights.sum())
 
 
-def weigh(
-    evidence: Evidence,
-    seen: Sight,
-    hand_config: HandConfig,
-    head_config: HeadConfig,
-    confusion: HandConfusion | None = None,
-) -> Weighing:
-    """Weigh all POIs in sight (one at least), by the paper's table 1 or another. A source that says nothing fits each alike.
+class SourceCurves:
+    """What hand and head tell of each bearing, by these settings: logarithms of likelihoods. Those asked for last are kept.
+
+    Of a walk only the last view changes from frame to frame.
+    """
+
+    KEPT = 128
+
+    def __init__(self, hand: HandConfig, head: HeadConfig, confusion: HandConfusion | None = None) -> None:
+        """By the paper's table 1 or another."""
+        self.head_config = head
+        self.of_hand: Callable[[HandObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_hand, hand, confusion))
+        self.of_head: Callable[[HeadObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_head, head))
+
+
+def _log_of_hand(config: HandConfig, confusion: HandConfusion | None, seen: HandObservation) -> Curve:
+    return np.log(hand_curve(seen, config, confusion))
+
+
+def _log_of_head(config: HeadConfig, seen: HeadObservation) -> Curve:
+    return np.log(head_curve(seen, config))
+
+
+def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
+    """Weigh all POIs in sight (one at least). A source that says nothing fits each alike.
 
     The frames of a stroke err alike: what was seen from several places is one observation, and each counts by its share of it
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
     views = evidence.views or (View(evidence.hand, evidence.head),)
-    curves = {"hand": _hands(views, hand_config, confusion), "head": _heads(views, head_config)}
-    told = {name: of_views for name, of_views in curves.items() if of_views is not None}
+    of_sources = {
+        "hand": _told([(view.hand, view.hand_share) for view in views], evidence.hand, curves.of_hand),
+        "head": _told([(view.head, view.head_share) for view in views], evidence.head, curves.of_head),
+    }
+    told = {name: of_views for name, of_views in of_sources.items() if of_views is not None}
     if not told:
         even = np.ones(len(seen))
         return Weighing(even, even, even, even)
     places = [view.place for view in views if view.place is not None]
-    found = np.empty((4, len(seen)))
+    found, stacked = np.empty((len(told) + 2, len(seen))), np.array([*told.values()])
     for part, count in _parts(seen, places):
-        found[:, part] = _part(told, seen.cases_from(places, part, count))
-    hand, head, joint, most = found
-    best = math.prod(float(of_views.max(axis=1).prod()) for of_views in told.values())
-    floor = float(told["head"].min(axis=1).prod()) if "head" in told else 1.0
-    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, head_config)
+        found[:, part] = _part(stacked, seen.cases_from(places, part, count))
+    by_name = dict(zip((*told, "joint", "most"), found, strict=True))
+    hand, head = (by_name[name] if name in told else np.ones(len(seen)) for name in ("hand", "head"))
+    joint, most = by_name["joint"], by_name["most"]
+    best = math.prod(stacked.max(axis=2).ravel().tolist())
+    floor = math.prod(told["head"].min(axis=1).tolist()) if "head" in told else 1.0
+    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves.head_config)
 
 
 def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices, int]]:
@@ -91,9 +116,9 @@ def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices
     Of a walk past very many those whose bearing is well known are weighed in few cases: each is weighed from every place.
     """
     everybody = np.arange(len(seen))
-    well_known = seen.bearings.sigma < FEW_BELOW_DEG
     groups = [(everybody, CASES)]
     if places and len(seen) > MANY:
+        well_known = seen.bearings.sigma < FEW_BELOW_DEG
         groups = [(everybody[~well_known], CASES), (everybody[well_known], FEW_CASES)]
     for which, count in groups:
         at_a_time = max(1, AT_A_TIME * CASES // (count * max(1, len(places))))
@@ -106,7 +131,7 @@ def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: Hea
 
     How well a POI fits is about directions: a pitch that is wrong makes no POI one that nobody can have meant.
     """
-    if evidence.head is None or evidence.views or seen.place is None:
+    if evidence.head is None or evidence.head.pitch_deg is None or evidence.views or seen.place is None:
         return weighed
     xyz, extent = seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen]
     high = likelihoods(evidence.head, seen.place, xyz, extent, config)
@@ -116,41 +141,30 @@ def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: Hea
     return Weighing(weighed.hand, weighed.head * high, weighed.joint * high, weighed.fit, floor)
 
 
-def _part(told: Mapping[str, Values], cases: Singles) -> Values:
-    """Of a part of the POIs: the likelihoods of hand, head and both, and of both in the best case (4, n)."""
-    of_source = dict(zip(told, at(np.stack(list(told.values())), cases).prod(axis=1), strict=True))
-    joint = np.asarray(math.prod(of_source.values()))
-    means = [of_source[name].mean(axis=0) if name in told else np.ones(joint.shape[1]) for name in ("hand", "head")]
-    return np.array([*means, joint.mean(axis=0), joint.max(axis=0)], dtype=np.float64)
+def _part(told: Values, cases: Singles) -> Values:
+    """Of a part of the POIs: likelihoods of each source that tells something, of all together, and in the best case (s + 2, n).
+
+    `told` are the sources' curves in v views (s, v, 360).
+    """
+    of_sources = at(told, cases).prod(axis=1)
+    joint = of_sources.prod(axis=0)
+    return np.concatenate([of_sources.mean(axis=1), joint.mean(axis=0)[None], joint.max(axis=0)[None]])
 
 
-def _hands(views: Sequence[View], config: HandConfig, confusion: HandConfusion | None) -> Values | None:
-    """What the hand tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
-    shares = [view.hand_share * _trust(view.hand.agreement) if view.hand else 0.0 for view in views]
-    if not any(shares):
+def _told(
+    seen: Sequence[tuple[Seen | None, float]],
+    whole: HandObservation | HeadObservation | None,
+    curve_of: Callable[[Seen], Curve],
+) -> Values | None:
+    """What a source tells in each view, to the power of its share in all (v, 360); none where it tells nothing in any.
+
+    `whole` is the same source over all views, by which it is trusted.
+    """
+    if whole is None or not any(share for one, share in seen if one):
         return None
-    logs = [_log_of_hand(replace(view.hand, agreement=1.0), config, confusion) if view.hand else NOTHING for view in views]
-    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
-
-
-def _heads(views: Sequence[View], config: HeadConfig) -> Values | None:
-    """What the head tells in each view, to the power of its part (v, 360); none where it tells nothing in any."""
-    shares = [view.head_share * _trust(view.head.agreement) if view.head else 0.0 for view in views]
-    if not any(shares):
-        return None
-    logs = [_log_of_head(replace(view.head, agreement=1.0), config) if view.head else NOTHING for view in views]
-    return np.asarray(np.exp(np.array(shares)[:, None] * np.array(logs)))
-
-
-# Of a walk only the last view changes from frame to frame.
-@lru_cache(maxsize=256)
-def _log_of_hand(hand: HandObservation, config: HandConfig, confusion: HandConfusion | None) -> Curve:
-    return np.log(hand_curve(hand, config, confusion))
-
-
-@lru_cache(maxsize=256)
-def _log_of_head(head: HeadObservation, config: HeadConfig) -> Curve:
-    return np.log(head_curve(head, config))
+    shares = np.array([share if one else 0.0 for one, share in seen]) * _trust(whole.agreement)
+    logs = np.array([curve_of(one) if one else NOTHING for one, _ in seen])
+    return np.asarray(np.exp(shares[:, None] * logs))
 
 
 def _trust(agreement: float) -> float:
