@@ -1,11 +1,12 @@
 """Bearing of a pointing from one camera: where the fingertip is seen beside the head, and whom that fits.
 
-Turned round: for each bearing it is known where fingertips are when people point there, near and far, high and low, with arms
-straight, bent and from the hip, of their own side and across (`arms.npz`, six thousand arms of the simulator's fitting people
-in widths of their own faces, by `fitting/fit_arms.py`). Seen from the camera at the person's distance each of these arms puts
-its tip somewhere; a bearing is as likely as its arms put theirs where the tip is seen. Front and back are told apart as far as
-perspective, the height of the tip, and the size of fist and finger tell them apart. The answer is the likelihood of bearings;
-its mean and standard deviation, plain or folded at 90 degrees (`mirrored`), are for whoever wants one number.
+Turned round: for each bearing it is known where fingertip and fist are when people point there, near and far, high and low,
+with arms straight, bent and from the hip, of their own side and across (`arms.npz`, six thousand arms of the simulator's
+fitting people in widths of their own faces, by `fitting/fit_arms.py`). Seen from the camera at the person's distance each of
+these arms puts its tip somewhere, and its finger beyond the fist; a bearing is as likely as its arms put theirs where both are
+seen. Front and back are told apart as far as perspective, the height of the tip, and the size of the fist tell them apart.
+The answer is the likelihood of bearings; its mean and standard deviation, plain or folded at 90 degrees (`mirrored`), are for
+whoever wants one number.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ Floats = NDArray[np.floating[Any]]
 BEARINGS = np.arange(-180.0, 180.0, BEARING_STEP_DEG)
 NEAR_DEG = 5.0
 """How far the arms of a bearing go on telling of its neighbours."""
-TIP_SIGMA, FAR_TIP_SIGMA = 0.22, 0.05
-"""How far off a tip is measured, face widths, and share of its distance from the head: outlines end about the fingertip."""
+TIP_SIGMA, FAR_TIP_SIGMA = 0.15, 0.03
+"""How far off a tip is measured, face widths, and share of its distance from the head. By `fitting/choose_bearing.py`, as are
+EXTENT_SIGMA, DIRECTION_SIGMA and OUTLIERS."""
 NEAREST = 0.3
 """Of the person's distance: no arm comes nearer to the camera."""
 NO_ARM = 0.005
@@ -34,16 +36,14 @@ NO_ARM = 0.005
 LEAST_SIGMA_DEG = 8.0
 LEAST_EXTENT = 0.3
 """From the fist's middle to the end of its outline, face widths, where no finger shows."""
-EXTENT_SIGMA, DIRECTION_SIGMA = 0.15, 0.35
+EXTENT_SIGMA, DIRECTION_SIGMA = 0.1, 0.35
 """How far off the way from the fist's middle to the fingertip is measured: its length, face widths, and direction, radians."""
 # Radius of the fist against the bearing (larger toward the camera). Eased from hands of the rendered clips; it says little.
 SHAPE_BEARINGS = np.array([0.0, 20.0, 40.0, 80.0, 100.0, 115.0, 135.0, 180.0])
 PALM_RADII = np.array([0.33, 0.31, 0.27, 0.24, 0.24, 0.23, 0.20, 0.19])
 PALM_SIGMA = 0.05
-OUTLIERS = 0.3
-"""Share of hands whose finger and palm tell nothing. By `fitting/choose_outliers.py` more would be better (3.80 nats at .15,
-3.66 at .3, 3.51 at .7): far away the tracker loses fingers at any bearing. On the labelled clips less would: 2.77, 2.76, 2.80.
-"""
+OUTLIERS = 0.1
+"""Share of hands whose finger and palm tell nothing: the tracker lost them."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
-"""Chooses how little finger and palm tell of a pointing's bearing: `OUTLIERS` of `deixis_gesture/bearing.py`.
+"""Chooses how exactly arms are seen, and how often not at all: constants of `deixis_gesture/bearing.py` (`TRIED`).
 
-usage: python fitting/choose_outliers.py [--seeds A:B]
+usage: python fitting/choose_bearing.py [--seeds A:B] [--kinds KINDS]
 
-Tracker and gesture stage play the clips of these seeds (default: 0:40); for each value it is said how likely it makes the true
-bearings of the pointings that are recognised (blurred as fusion does), and how far off the likeliest bearings are. It plays the
-clips once: some minutes on two cores, and half a minute to render each where it is not there.
+Tracker and gesture stage play the clips of these seeds (default: those of 0:20 with one person who points); for each value of
+each constant, the others as they stand, it is said how likely it makes the true bearings of the pointings that are recognised
+(blurred as fusion does), and how far off the likeliest bearings are. It plays the clips once: some minutes on two cores, and
+half a minute to render each where it is not there.
 """
 
 from __future__ import annotations
@@ -22,7 +23,13 @@ from deixis_gesture.bearing import BEARINGS, ArmSight, Bearing, Floats, estimate
 from deixis_schemas.messages import Side
 from rich.console import Console
 
-TRIED = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
+TRIED = {
+    "OUTLIERS": (0.03, 0.1, 0.3, 0.5, 0.8),
+    "TIP_SIGMA": (0.1, 0.15, 0.22, 0.3),
+    "FAR_TIP_SIGMA": (0.02, 0.03, 0.05, 0.08),
+    "EXTENT_SIGMA": (0.07, 0.1, 0.15, 0.22),
+    "DIRECTION_SIGMA": (0.2, 0.35, 0.6),
+}
 LEAST_FRAMES = 5
 BLUR_DEG, NONSENSE = 6.0, 0.15
 """As fusion reads bearings (`hand.sigma_floor_deg`, `hand.outlier`)."""
@@ -32,15 +39,22 @@ Asked = tuple[ArmSight, Side | None]
 def main() -> int:
     """Play, try, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", default="0:40")
+    parser.add_argument("--seeds", default="0:20")
+    parser.add_argument("--kinds", default="point", help="of the simulator's clips (default: point)")
     given = parser.parse_args()
-    strokes = [stroke for clip in choose(Choice(None, given.seeds), Console(stderr=True)).clips for stroke in asked_in(clip)]
-    for value in TRIED:
-        bearing.OUTLIERS = value
-        told, off = zip(*(_read(true_deg, asked) for true_deg, asked in strokes), strict=True)
-        print(
-            f"OUTLIERS {value:g}: {-np.mean(told):.3f} nats, {np.median(off):.0f} degrees off (median), {len(strokes)} strokes"
-        )
+    clips = choose(Choice(None, given.seeds, kinds=given.kinds), Console(stderr=True)).clips
+    strokes = [stroke for clip in clips for stroke in asked_in(clip)]
+    for name, values in TRIED.items():
+        stands = getattr(bearing, name)
+        for value in values:
+            setattr(bearing, name, value)
+            told, off = zip(*(_read(true_deg, asked) for true_deg, asked in strokes), strict=True)
+            print(
+                f"{name} {value:g}: {-np.mean(told):.3f} nats, {np.median(off):.0f} degrees off (median)",
+                len(strokes),
+                "strokes",
+            )
+        setattr(bearing, name, stands)
     return 0
 
 
