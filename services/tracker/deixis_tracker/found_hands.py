@@ -6,20 +6,26 @@ the same. What belongs to such a hand is what has the colour of its middle, near
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND, Maps, Seen
-from deixis_tracker.frame import Box, Image, Mask, Views, around
+from deixis_tracker.finder import HAND, Maps, Seen
+from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around
 from deixis_tracker.median import median
 from deixis_tracker.persons import Person
 from deixis_tracker.segmentation import Blob
 
 REACH, MIDDLE, USUAL = 0.62, 0.14, 0.3  # head widths: farthest part of a hand, what is surely hand, a hand taken for a disk
 BESIDE = 1.6  # head widths from the head; nearer, shoulders of arms that move pass for hands
+CHIN = 0.7  # head widths below the head
+CAME, CAME_NEAR, VERY_SURELY = 0.3, 0.6, 1.5  # share of a hand's place that differs from the room, log odds by which it needs not
+FOREARM, NO_HAND = 2.2, -1.0  # head widths from hand to arm, and log odds of the finder below which there is surely no hand
+KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3  # a hand that the finder saw is believed on down to so far below doubtful odds, for so long
+COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
 ALIKE = 2.5  # deviations of the colour of what is surely hand
 LEAST_SPREAD = 9.0  # grey levels
@@ -40,20 +46,16 @@ class Place(NamedTuple):
         return around(self.hand.x, self.hand.y, reach, reach, reach, reach)
 
 
-def found_hands(views: Views, persons: list[Person], blobs: list[Blob], config: TrackerConfig) -> list[Blob]:
-    """Blobs of the hands of these persons that none of `blobs` covers."""
-    places = [place for place in hand_places(persons, config) if not any(_covers(blob, place) for blob in blobs)]
-    return [blob for place in places if (blob := _blob(views, place, config)).area]
+def found_hands(views: Views, persons: list[Person], blobs: list[Blob], config: TrackerConfig, step: Step) -> list[Blob]:
+    """All blobs: `blobs` without bare arms, and the hands of these persons that none of them covers."""
+    places = [place for place in hand_places(views, persons, config, step) if not any(_covers(blob, place) for blob in blobs)]
+    kept = [blob for blob in blobs if not any(_is_arm(blob, place) for place in places)]
+    return kept + [blob for place in places if (blob := _blob(views, place, config)).area]
 
 
-def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
-    """Of each person one place at most a hand, the surest first; a place that two see belongs to whom it fits better."""
-    seen = []
-    for person in persons:
-        for kind in (RIGHT_HAND, LEFT_HAND):
-            hands = (Place(person, hand) for hand in _hands(person, kind, config.hand_odds))
-            near = [place for place in hands if BESIDE < person.distance(place.hand.x, place.hand.y) < config.reach]
-            seen += near[:1]
+def hand_places(views: Views, persons: list[Person], config: TrackerConfig, step: Step) -> list[Place]:
+    """Of each person two places at most, the surest first; a place that two see belongs to whom it fits better."""
+    seen = [place for person in persons for place in _places(views, person, config, step)]
     kept: list[Place] = []
     for place in sorted(seen, key=lambda place: -place.hand.odds):
         if all(_apart(place, other) for other in kept):
@@ -61,8 +63,54 @@ def hand_places(persons: list[Person], config: TrackerConfig) -> list[Place]:
     return kept
 
 
-def _hands(person: Person, kind: int, least: float) -> list[Seen]:
-    return person.around.hands(kind, least) if person.around is not None else []
+def _places(views: Views, person: Person, config: TrackerConfig, step: Step) -> list[Place]:
+    if person.around is None:
+        return []
+    places: list[Place] = []
+    for hand in person.around.hands(HAND, config.hand_odds - KEPT_ODDS):
+        place = Place(person, hand)
+        sure = hand.odds >= config.hand_odds or _is_followed(place, step)
+        if sure and _may_be_there(views, place, config) and all(_apart(place, other) for other in places):
+            places.append(place)
+    return places[:2]
+
+
+def _is_followed(place: Place, step: Step) -> bool:
+    """Whether a hand was just seen there by the finder: one that is held still is not lost where the finder doubts."""
+    person, (x, y) = place.person, (place.hand.x, place.hand.y)
+    return any(
+        step.now_ns - hand.as_seen_ns <= KEPT_SEEN_S * 1e9 and math.dist(hand.last_seen, (x, y)) < ONE_HAND * person.width
+        for hand in person.hands
+    )
+
+
+def _may_be_there(views: Views, place: Place, config: TrackerConfig) -> bool:
+    """Within reach and no shoulder, and where something has come before the room, unless the hand is seen very surely."""
+    person, hand = place.person, place.hand
+    away = person.distance(hand.x, hand.y)
+    near = away < BESIDE
+    if away >= config.reach or (near and hand.y > person.y + CHIN * person.width):
+        return False
+    half = USUAL * person.width
+    rows, columns = around(hand.x, hand.y, half, half, half, half).scaled(COARSE).window(*views.changed.shape)
+    part = views.changed[rows, columns]
+    came = np.count_nonzero(part) / max(1, part.size)
+    return bool(came >= (CAME_NEAR if near else CAME)) or (not near and hand.odds >= config.hand_odds + VERY_SURELY)
+
+
+def _is_arm(blob: Blob, place: Place) -> bool:
+    """Whether a blob is the forearm of that hand, which has another colour or lies before the head: near, and no hand itself."""
+    person, hand = place.person, place.hand
+    assert person.around is not None
+    rows, columns = np.nonzero(blob.mask)
+    if np.hypot(columns + blob.x0 - hand.x, rows + blob.y0 - hand.y).min() > FOREARM * person.width:
+        return False
+    return not any(_is_on(blob, other) for other in person.around.hands(HAND, NO_HAND))
+
+
+def _is_on(blob: Blob, hand: Seen) -> bool:
+    row, column = round(hand.y - blob.y0), round(hand.x - blob.x0)
+    return 0 <= row < blob.mask.shape[0] and 0 <= column < blob.mask.shape[1] and bool(blob.mask[row, column])
 
 
 def _apart(place: Place, other: Place) -> bool:
@@ -71,11 +119,11 @@ def _apart(place: Place, other: Place) -> bool:
 
 
 def _covers(blob: Blob, place: Place) -> bool:
-    """Whether a blob has pixels where the hand is."""
+    """Whether a blob has a good part of where the hand is."""
     half = USUAL * place.person.width
     box = around(place.hand.x - blob.x0, place.hand.y - blob.y0, half, half, half, half)
     rows, columns = box.window(*blob.mask.shape)
-    return bool(blob.mask[rows, columns].any())
+    return bool(np.count_nonzero(blob.mask[rows, columns]) >= COVERED * (2 * half) ** 2)
 
 
 def _blob(views: Views, place: Place, config: TrackerConfig) -> Blob:

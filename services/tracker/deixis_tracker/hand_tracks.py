@@ -9,8 +9,8 @@ import numpy as np
 
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND
-from deixis_tracker.found_hands import REACH
+from deixis_tracker.finder import HAND, LEFT_HAND, RIGHT_HAND
+from deixis_tracker.found_hands import KEPT_ODDS, KEPT_SEEN_S, NO_HAND, REACH
 from deixis_tracker.frame import Step
 from deixis_tracker.hands import Hand, cut_hand, hand_about, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
@@ -27,8 +27,10 @@ LEAST_SUPPORT = 0.15
 ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
 # A hand is cut out where the finder sees it if its log odds are so far beyond doubtful ones, and then on down to so far below,
 # for so long. Chosen among 0.4, 0.8, 0.9, never, and with or without KEPT, by `deixis eval --stage tracker --seeds 1000:1012`.
-SURELY, KEPT_ODDS, KEPT_SEEN_S = 0.4, 1.0, 0.3
+SURELY = 0.4
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
+UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, by whatever colour; blurred ones it misses for a while
+EDGE_PX = 2
 LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
 Claim = tuple[Person, HandTrack]
@@ -143,9 +145,25 @@ class HandTracks:
     def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, odds: Odds, step: Step) -> None:
         track.pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
         track.blob, track.seen_ns = hand, step.now_ns
+        if blob.owner is not None:
+            track.as_seen_ns = step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
+        self._judge(person, track, hand, step)
         track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
+
+    def _judge(self, person: Person, track: HandTrack, hand: Hand, step: Step) -> None:
+        """Note where the finder does not rule a hand out. Of a hand that the picture cuts it may see too little."""
+        if person.around is None or self._is_cut(hand):
+            track.likely_ns = step.now_ns
+        elif not person.around.odds_near(HAND, *hand.centroid, ODDS_NEAR * person.width) < NO_HAND:
+            track.likely_ns = step.now_ns
+
+    def _is_cut(self, hand: Hand) -> bool:
+        (height, width), (rows, columns) = self._size, np.nonzero(hand.mask)
+        left, top = hand.x0 + columns.min(), hand.y0 + rows.min()
+        right, bottom = hand.x0 + columns.max(), hand.y0 + rows.max()
+        return bool(min(left, top, width - 1 - right, height - 1 - bottom) <= EDGE_PX)
 
     def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
         """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
@@ -164,6 +182,7 @@ class HandTracks:
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
             track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
             track.belief.update(_features(person, track, hand, blob, odds), 1.0)
+            self._judge(person, track, hand, step)
             person.hands.append(track)
 
     def _settle(self, person: Person, step: Step) -> None:
@@ -172,7 +191,10 @@ class HandTracks:
             if hand.blob is None:
                 hand.motion.damp(step.kept(UNSEEN_SPEED_KEPT))
         kept = [hand for hand in person.hands if self._may_be_there(person, hand, step)]
-        seen = [hand for hand in kept if hand.blob is not None]
+        seen = [hand for hand in kept if hand.blob is not None and _is_likely(hand, step)]
+        for hand in kept:
+            if not _is_likely(hand, step):
+                hand.kind = "unknown"
         for hand, kind in zip(seen, label([h.belief for h in seen], [h.kind for h in seen]), strict=True):
             hand.kind = kind
         shown = {hand.kind for hand in seen if is_shown(hand)}
@@ -185,12 +207,16 @@ class HandTracks:
         return near and recent and 0 <= x < width and 0 <= y < height
 
 
+def _is_likely(hand: HandTrack, step: Step) -> bool:
+    return step.now_ns - hand.likely_ns <= UNLIKELY_S * 1e9
+
+
 def _seen_on(person: Person, blob: Blob, least: float) -> list[tuple[float, float]]:
     """Where the finder sees hands on a blob."""
     if person.around is None:
         return []
     height, width = blob.mask.shape
-    seen = [(one.x, one.y) for kind in (RIGHT_HAND, LEFT_HAND) for one in person.around.hands(kind, least)]
+    seen = [(one.x, one.y) for one in person.around.hands(HAND, least)]
     cells = [(round(x - blob.x0), round(y - blob.y0)) for x, y in seen]
     inside = [0 <= column < width and 0 <= row < height and bool(blob.mask[row, column]) for column, row in cells]
     return [place for place, on_blob in zip(seen, inside, strict=True) if on_blob]
