@@ -15,6 +15,7 @@ import numpy as np
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import HAND, Maps, Seen
 from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around
+from deixis_tracker.hands import LEAST_THICKNESS, thickness
 from deixis_tracker.median import median
 from deixis_tracker.persons import Person
 from deixis_tracker.segmentation import Blob
@@ -25,6 +26,7 @@ CHIN = 0.7  # head widths below the head
 CAME, CAME_NEAR, VERY_SURELY = 0.3, 0.6, 1.5  # share of a hand's place that differs from the room, log odds by which it needs not
 FOREARM, NO_HAND = 2.2, -1.0  # head widths from hand to arm, and log odds of the finder below which there is surely no hand
 KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3  # a hand that the finder saw is believed on down to so far below doubtful odds, for so long
+POOR_AREA, INSIDE = 0.2, 0.7  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
 COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
 ALIKE = 2.5  # deviations of the colour of what is surely hand
@@ -46,16 +48,29 @@ class Place(NamedTuple):
         return around(self.hand.x, self.hand.y, reach, reach, reach, reach)
 
 
-def found_hands(views: Views, persons: list[Person], blobs: list[Blob], config: TrackerConfig, step: Step) -> list[Blob]:
-    """All blobs: `blobs` without bare arms, and the hands of these persons that none of them covers."""
-    places = [place for place in hand_places(views, persons, config, step) if not any(_covers(blob, place) for blob in blobs)]
-    kept = [blob for blob in blobs if not any(_is_arm(blob, place) for place in places)]
-    return kept + [blob for place in places if (blob := _blob(views, place, config)).area]
+def found_hands(
+    views: Views, unknown: Mask, persons: list[Person], blobs: list[Blob], config: TrackerConfig, step: Step
+) -> list[Blob]:
+    """All blobs: `blobs` without bare arms, and the hands of these persons that none of them shows well.
+
+    `unknown`: 255 where the room is not known, at coarse resolution.
+    """
+    telling = np.asarray(cv2.bitwise_or(views.changed, unknown), np.uint8)
+    places = hand_places(telling, persons, config, step)
+    found = [(place, [blob for blob in blobs if _is_piece(blob, place)]) for place in places]
+    pieces = [id(blob) for _, parts in found for blob in parts]
+    whole = [blob for blob in blobs if id(blob) not in pieces]
+    missing = [(place, parts) for place, parts in found if not any(_covers(blob, place) for blob in whole)]
+    kept = [blob for blob in whole if not any(_is_arm(blob, place) for place, _ in missing)]
+    return kept + [blob for place, parts in missing if (blob := _blob(views, place, parts, config)).area]
 
 
-def hand_places(views: Views, persons: list[Person], config: TrackerConfig, step: Step) -> list[Place]:
-    """Of each person two places at most, the surest first; a place that two see belongs to whom it fits better."""
-    seen = [place for person in persons for place in _places(views, person, config, step)]
+def hand_places(telling: Mask, persons: list[Person], config: TrackerConfig, step: Step) -> list[Place]:
+    """Of each person two places at most, the surest first; a place that two see belongs to whom it fits better.
+
+    `telling`: 255 where something has come before the room, or where the room is not known, at coarse resolution.
+    """
+    seen = [place for person in persons for place in _places(telling, person, config, step)]
     kept: list[Place] = []
     for place in sorted(seen, key=lambda place: -place.hand.odds):
         if all(_apart(place, other) for other in kept):
@@ -63,14 +78,14 @@ def hand_places(views: Views, persons: list[Person], config: TrackerConfig, step
     return kept
 
 
-def _places(views: Views, person: Person, config: TrackerConfig, step: Step) -> list[Place]:
+def _places(telling: Mask, person: Person, config: TrackerConfig, step: Step) -> list[Place]:
     if person.around is None:
         return []
     places: list[Place] = []
     for hand in person.around.hands(HAND, config.hand_odds - KEPT_ODDS):
         place = Place(person, hand)
         sure = hand.odds >= config.hand_odds or _is_followed(place, step)
-        if sure and _may_be_there(views, place, config) and all(_apart(place, other) for other in places):
+        if sure and _may_be_there(telling, place, config) and all(_apart(place, other) for other in places):
             places.append(place)
     return places[:2]
 
@@ -84,7 +99,7 @@ def _is_followed(place: Place, step: Step) -> bool:
     )
 
 
-def _may_be_there(views: Views, place: Place, config: TrackerConfig) -> bool:
+def _may_be_there(telling: Mask, place: Place, config: TrackerConfig) -> bool:
     """Within reach and no shoulder, and where something has come before the room, unless the hand is seen very surely."""
     person, hand = place.person, place.hand
     away = person.distance(hand.x, hand.y)
@@ -92,10 +107,22 @@ def _may_be_there(views: Views, place: Place, config: TrackerConfig) -> bool:
     if away >= config.reach or (near and hand.y > person.y + CHIN * person.width):
         return False
     half = USUAL * person.width
-    rows, columns = around(hand.x, hand.y, half, half, half, half).scaled(COARSE).window(*views.changed.shape)
-    part = views.changed[rows, columns]
+    rows, columns = around(hand.x, hand.y, half, half, half, half).scaled(COARSE).window(*telling.shape)
+    part = telling[rows, columns]
     came = np.count_nonzero(part) / max(1, part.size)
     return bool(came >= (CAME_NEAR if near else CAME)) or (not near and hand.odds >= config.hand_odds + VERY_SURELY)
+
+
+def _is_piece(blob: Blob, place: Place) -> bool:
+    """Whether a blob is a poor piece of that hand, of which colour has not given the rest."""
+    w = place.person.width
+    if not (blob.area < POOR_AREA * w * w or thickness(blob.mask) < LEAST_THICKNESS * w):
+        return False
+    rows, columns = place.box.window(10**6, 10**6)
+    inside = blob.mask[
+        max(0, rows.start - blob.y0) : max(0, rows.stop - blob.y0), max(0, columns.start - blob.x0) : max(0, columns.stop - blob.x0)
+    ]
+    return bool(np.count_nonzero(inside) >= INSIDE * blob.area)
 
 
 def _is_arm(blob: Blob, place: Place) -> bool:
@@ -126,8 +153,8 @@ def _covers(blob: Blob, place: Place) -> bool:
     return bool(np.count_nonzero(blob.mask[rows, columns]) >= COVERED * (2 * half) ** 2)
 
 
-def _blob(views: Views, place: Place, config: TrackerConfig) -> Blob:
-    """What has the colour of the hand's middle and hangs together with it; a disk where that is no hand's size."""
+def _blob(views: Views, place: Place, pieces: list[Blob], config: TrackerConfig) -> Blob:
+    """What has the colour of the hand's middle and hangs together with it, and its pieces; a disk where that is no hand's size."""
     w, hand = place.person.width, place.hand
     rows, columns = place.box.window(*views.full.shape[:2])
     x, y = np.arange(columns.start, columns.stop) - hand.x, np.arange(rows.start, rows.stop) - hand.y
@@ -135,8 +162,18 @@ def _blob(views: Views, place: Place, config: TrackerConfig) -> Blob:
     mask = _about_middle(_alike(views.full[rows, columns], away), away)
     if not config.min_hand_area * w * w <= np.count_nonzero(mask) <= MOST_AREA * w * w:
         mask = np.asarray(away <= USUAL, np.uint8)
+    for piece in pieces:
+        _paste(piece, mask, columns.start, rows.start)
     evidence = float(1 / (1 + np.exp(config.hand_odds - min(hand.odds, 10.0))))
     return Blob(mask, columns.start, rows.start, int(np.count_nonzero(mask)), evidence, SURE, place.person.person_id)
+
+
+def _paste(piece: Blob, mask: Mask, x0: int, y0: int) -> None:
+    """Add what of a piece lies in the window of a mask whose corner is at (x0, y0)."""
+    rows, columns = np.nonzero(piece.mask)
+    rows, columns = rows + piece.y0 - y0, columns + piece.x0 - x0
+    inside = (rows >= 0) & (rows < mask.shape[0]) & (columns >= 0) & (columns < mask.shape[1])
+    mask[rows[inside], columns[inside]] = 1
 
 
 def _alike(part: Image, away: Maps) -> Mask:

@@ -12,7 +12,7 @@ from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import HAND, LEFT_HAND, RIGHT_HAND
 from deixis_tracker.found_hands import KEPT_ODDS, KEPT_SEEN_S, NO_HAND, REACH
 from deixis_tracker.frame import Step
-from deixis_tracker.hands import Hand, cut_hand, hand_about, thickness
+from deixis_tracker.hands import LEAST_THICKNESS, Hand, cut_hand, hand_about, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import MOST_HANDS, HandTrack, Person, is_shown
@@ -31,7 +31,6 @@ SURELY = 0.4
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
 UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, by whatever colour; blurred ones it misses for a while
 EDGE_PX = 2
-LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 
 Claim = tuple[Person, HandTrack]
 Odds = tuple[float, float]  # of a right and of a left hand

@@ -104,7 +104,8 @@ class Tracker:
         persons = self._heads.persons
         if persons:
             blobs = hand_blobs(views, self._skin, self._room, self._motion, persons, self._config)
-            self._hands.update(persons, found_hands(views, persons, blobs, self._config, step), step)
+            blobs = found_hands(views, self._room.unknown, persons, blobs, self._config, step)
+            self._hands.update(persons, blobs, step)
         self._people = people_mask(persons, (views.skin.shape[0], views.skin.shape[1]))
         self._room.update(views.coarse, views.changed, self._people, step)
         if step.periods(LEARN_ROOM_S, LEARN_ROOM_AHEAD_S):
