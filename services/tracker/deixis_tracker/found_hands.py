@@ -23,10 +23,10 @@ from deixis_tracker.segmentation import Blob
 REACH, MIDDLE, USUAL = 0.62, 0.14, 0.3  # head widths: farthest part of a hand, what is surely hand, a hand taken for a disk
 BESIDE = 1.6  # head widths from the head; nearer, shoulders of arms that move pass for hands
 CHIN = 0.7  # head widths below the head
-CAME, CAME_NEAR, VERY_SURELY = 0.3, 0.6, 1.5  # share of a hand's place that differs from the room, log odds by which it needs not
+CAME, CAME_NEAR, VERY_SURELY = 0.15, 0.6, 1.5  # share of a hand's place that differs from the room, log odds by which it needs not
 FOREARM, NO_HAND = 2.2, -1.0  # head widths from hand to arm, and log odds of the finder below which there is surely no hand
 KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3  # a hand that the finder saw is believed on down to so far below doubtful odds, for so long
-POOR_AREA, INSIDE = 0.2, 0.7  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
+POOR_AREA, INSIDE = 0.2, 0.5  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
 COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
 ALIKE = 2.5  # deviations of the colour of what is surely hand

@@ -27,8 +27,9 @@ LEAST_SUPPORT = 0.15
 ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
 # A hand is cut out where the finder sees it if its log odds are so far beyond doubtful ones, and then on down to so far below,
 # for so long. Chosen among 0.4, 0.8, 0.9, never, and with or without KEPT, by `deixis eval --stage tracker --seeds 1000:1012`.
-SURELY = 0.4
-ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
+# Or if they are so much higher than at the end of the blob, which may be an elbow.
+SURELY, LIKELIER = 0.4, 1.0
+ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
 UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, by whatever colour; blurred ones it misses for a while
 EDGE_PX = 2
 
@@ -116,7 +117,8 @@ class HandTracks:
         and fro is none that is held still.
         """
         width, kept = person.width, track is not None and now_ns - track.as_seen_ns <= KEPT_SEEN_S * 1e9
-        places = _seen_on(person, blob, self._config.hand_odds + (-KEPT_ODDS if kept else SURELY))
+        least = self._config.hand_odds + (-KEPT_ODDS if kept else SURELY)
+        places = _seen_on(person, blob, min(least, max(NO_HAND, _hand_odds(person, hand) + LIKELIER)))
         if not places:
             return hand, False
         expected = (track.motion.x, track.motion.y) if kept and track is not None else hand.centroid
@@ -148,15 +150,13 @@ class HandTracks:
             track.as_seen_ns = step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
-        self._judge(person, track, hand, step)
+        if self._may_be(person, hand):
+            track.likely_ns = step.now_ns
         track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
 
-    def _judge(self, person: Person, track: HandTrack, hand: Hand, step: Step) -> None:
-        """Note where the finder does not rule a hand out. Of a hand that the picture cuts it may see too little."""
-        if person.around is None or self._is_cut(hand):
-            track.likely_ns = step.now_ns
-        elif not person.around.odds_near(HAND, *hand.centroid, ODDS_NEAR * person.width) < NO_HAND:
-            track.likely_ns = step.now_ns
+    def _may_be(self, person: Person, hand: Hand) -> bool:
+        """Whether the finder does not rule a hand out there. Of one that the picture cuts it may see too little."""
+        return person.around is None or _hand_odds(person, hand) >= NO_HAND or self._is_cut(hand)
 
     def _is_cut(self, hand: Hand) -> bool:
         (height, width), (rows, columns) = self._size, np.nonzero(hand.mask)
@@ -170,7 +170,7 @@ class HandTracks:
         owners = [person for person in persons if person.person_id == blob.owner]
         person = min(owners or persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
         hand = self._cut(person, blob, None, x, step.now_ns)
-        if hand is None or person.distance(*hand.centroid) > self._config.reach:
+        if hand is None or person.distance(*hand.centroid) > self._config.reach or not self._may_be(person, hand):
             return
         track, odds = _lost_hand(person, hand, step), _odds(person, hand, self._config.hand_odds)
         if track is not None:  # a blurred hand is lost for some frames, and comes to rest somewhere else
@@ -179,9 +179,8 @@ class HandTracks:
         elif len(person.hands) < MOST_HANDS:
             motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
-            track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
+            track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, likely_ns=step.now_ns, evidence=blob.evidence)
             track.belief.update(_features(person, track, hand, blob, odds), 1.0)
-            self._judge(person, track, hand, step)
             person.hands.append(track)
 
     def _settle(self, person: Person, step: Step) -> None:
@@ -204,6 +203,11 @@ class HandTracks:
         near = person.distance(x, y) < 1.3 * self._config.reach
         recent = step.now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9
         return near and recent and 0 <= x < width and 0 <= y < height
+
+
+def _hand_odds(person: Person, hand: Hand) -> float:
+    """The finder's log odds of a hand there, of either side; -inf outside of what it has looked at."""
+    return person.around.odds_near(HAND, *hand.centroid, ODDS_NEAR * person.width) if person.around is not None else -math.inf
 
 
 def _is_likely(hand: HandTrack, step: Step) -> bool:
