@@ -91,10 +91,10 @@ def _places(telling: Mask, person: Person, config: TrackerConfig, step: Step) ->
 
 
 def _is_followed(place: Place, step: Step) -> bool:
-    """Whether a hand was just seen there by the finder: one that is held still is not lost where the finder doubts."""
+    """Whether a hand was there just now: one that is held still is not lost where the finder doubts."""
     person, (x, y) = place.person, (place.hand.x, place.hand.y)
     return any(
-        step.now_ns - hand.as_seen_ns <= KEPT_SEEN_S * 1e9 and math.dist(hand.last_seen, (x, y)) < ONE_HAND * person.width
+        step.now_ns - hand.likely_ns <= KEPT_SEEN_S * 1e9 and math.dist(hand.last_seen, (x, y)) < REACH * person.width
         for hand in person.hands
     )
 
