@@ -17,15 +17,19 @@ from deixis_tracker.finder import HAND, Maps, Seen
 from deixis_tracker.frame import COARSE, Box, Image, Mask, Step, Views, around
 from deixis_tracker.hands import LEAST_THICKNESS, thickness
 from deixis_tracker.median import median
-from deixis_tracker.persons import Person
+from deixis_tracker.persons import Person, is_shown
 from deixis_tracker.segmentation import Blob
 
 REACH, MIDDLE, USUAL = 0.62, 0.14, 0.3  # head widths: farthest part of a hand, what is surely hand, a hand taken for a disk
 BESIDE = 1.6  # head widths from the head; nearer, shoulders of arms that move pass for hands
 CHIN = 0.7  # head widths below the head
-CAME, CAME_NEAR, VERY_SURELY = 0.15, 0.6, 1.5  # share of a hand's place that differs from the room, log odds by which it needs not
-FOREARM, NO_HAND = 2.2, -1.0  # head widths from hand to arm, and log odds of the finder below which there is surely no hand
-KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3  # a hand that the finder saw is believed on down to so far below doubtful odds, for so long
+# Share of a hand's place that differs from the room, so near the head, and log odds beyond doubtful ones by which it needs not.
+CAME, CAME_NEAR, VERY_SURELY = 0.15, 0.6, 1.5
+FOREARM = 2.2  # head widths from hand to arm
+NO_HAND = -1.0  # log odds of the finder below which there is surely no hand
+# Near a hand that was tracked so lately, places are believed down to so far below doubtful odds; where it is not sure to be one,
+# only for so long after the finder saw it: what is doubtful does not keep itself alive.
+KEPT_ODDS, KEPT_SEEN_S, KEPT_SURE_S = 1.0, 0.3, 1.0
 POOR_AREA, INSIDE = 0.2, 0.5  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
 COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
@@ -84,6 +88,8 @@ def _places(telling: Mask, person: Person, config: TrackerConfig, step: Step) ->
     places: list[Place] = []
     for hand in person.around.hands(HAND, config.hand_odds - KEPT_ODDS):
         place = Place(person, hand)
+        if person.is_outdated(hand.x, hand.y, step.now_ns):
+            continue
         sure = hand.odds >= config.hand_odds or _is_followed(place, step)
         if sure and _may_be_there(telling, place, config) and all(_apart(place, other) for other in places):
             places.append(place)
@@ -92,15 +98,16 @@ def _places(telling: Mask, person: Person, config: TrackerConfig, step: Step) ->
 
 def _is_followed(place: Place, step: Step) -> bool:
     """Whether a hand was there just now: one that is held still is not lost where the finder doubts."""
-    person, (x, y) = place.person, (place.hand.x, place.hand.y)
     return any(
-        step.now_ns - hand.likely_ns <= KEPT_SEEN_S * 1e9 and math.dist(hand.last_seen, (x, y)) < REACH * person.width
-        for hand in person.hands
+        step.now_ns - hand.likely_ns <= KEPT_SEEN_S * 1e9
+        and (is_shown(hand) or step.now_ns - hand.sure_ns <= KEPT_SURE_S * 1e9)
+        and math.dist(hand.last_seen, (place.hand.x, place.hand.y)) < REACH * place.person.width
+        for hand in place.person.hands
     )
 
 
 def _may_be_there(telling: Mask, place: Place, config: TrackerConfig) -> bool:
-    """Within reach and no shoulder, and where something has come before the room, unless the hand is seen very surely."""
+    """Within reach, no shoulder, and where something has come before the room, unless the hand is seen very surely."""
     person, hand = place.person, place.hand
     away = person.distance(hand.x, hand.y)
     near = away < BESIDE
@@ -120,13 +127,14 @@ def _is_piece(blob: Blob, place: Place) -> bool:
         return False
     rows, columns = place.box.window(10**6, 10**6)
     inside = blob.mask[
-        max(0, rows.start - blob.y0) : max(0, rows.stop - blob.y0), max(0, columns.start - blob.x0) : max(0, columns.stop - blob.x0)
+        max(0, rows.start - blob.y0) : max(0, rows.stop - blob.y0),
+        max(0, columns.start - blob.x0) : max(0, columns.stop - blob.x0),
     ]
     return bool(np.count_nonzero(inside) >= INSIDE * blob.area)
 
 
 def _is_arm(blob: Blob, place: Place) -> bool:
-    """Whether a blob is the forearm of that hand, which has another colour or lies before the head: near, and no hand itself."""
+    """Whether a blob is the forearm of that hand, which has another colour or lies before the head: near, and no hand."""
     person, hand = place.person, place.hand
     assert person.around is not None
     rows, columns = np.nonzero(blob.mask)
@@ -154,7 +162,9 @@ def _covers(blob: Blob, place: Place) -> bool:
 
 
 def _blob(views: Views, place: Place, pieces: list[Blob], config: TrackerConfig) -> Blob:
-    """What has the colour of the hand's middle and hangs together with it, and its pieces; a disk where that is no hand's size."""
+    """What has the colour of the hand's middle and hangs together with it, and its pieces; a disk where that is no hand's
+    size.
+    """
     w, hand = place.person.width, place.hand
     rows, columns = place.box.window(*views.full.shape[:2])
     x, y = np.arange(columns.start, columns.stop) - hand.x, np.arange(rows.start, rows.stop) - hand.y

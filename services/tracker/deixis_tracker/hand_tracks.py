@@ -30,7 +30,7 @@ ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the bl
 # Or if they are so much higher than at the end of the blob, which may be an elbow.
 SURELY, LIKELIER = 0.4, 1.0
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
-UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, by whatever colour; blurred ones it misses for a while
+UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, whatever its colour; blurred ones it misses a while
 EDGE_PX = 2
 
 Claim = tuple[Person, HandTrack]
@@ -116,6 +116,8 @@ class HandTracks:
         skin; and whether it was cut so. A track that was is cut so on, also where the finder doubts: a hand that leaps to
         and fro is none that is held still.
         """
+        if person.is_outdated(*hand.centroid, now_ns):
+            return hand, False
         width, kept = person.width, track is not None and now_ns - track.as_seen_ns <= KEPT_SEEN_S * 1e9
         least = self._config.hand_odds + (-KEPT_ODDS if kept else SURELY)
         places = _seen_on(person, blob, min(least, max(NO_HAND, _hand_odds(person, hand) + LIKELIER)))
@@ -152,6 +154,8 @@ class HandTracks:
         track.watched_s += step.passed_s
         if self._may_be(person, hand):
             track.likely_ns = step.now_ns
+        if _hand_odds(person, hand) >= self._config.hand_odds:
+            track.sure_ns = step.now_ns
         track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
 
     def _may_be(self, person: Person, hand: Hand) -> bool:
@@ -179,7 +183,10 @@ class HandTracks:
         elif len(person.hands) < MOST_HANDS:
             motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
-            track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, likely_ns=step.now_ns, evidence=blob.evidence)
+            track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
+            track.likely_ns = step.now_ns
+            if _hand_odds(person, hand) >= self._config.hand_odds:
+                track.sure_ns = step.now_ns
             track.belief.update(_features(person, track, hand, blob, odds), 1.0)
             person.hands.append(track)
 
