@@ -27,9 +27,9 @@ CHIN = 0.7  # head widths below the head
 CAME, CAME_NEAR, VERY_SURELY = 0.15, 0.6, 1.5
 FOREARM = 2.2  # head widths from hand to arm
 NO_HAND = -1.0  # log odds of the finder below which there is surely no hand
-# Near a hand that was tracked so lately, places are believed down to so far below doubtful odds; where it is not sure to be one,
-# only for so long after the finder saw it: what is doubtful does not keep itself alive.
-KEPT_ODDS, KEPT_SEEN_S, KEPT_SURE_S = 1.0, 0.3, 1.0
+# Near a hand that was tracked so lately, places are believed down to so far below doubtful odds: near one that is surely
+# a hand, or where something has come before the room. What is doubtful and stands in the room does not keep itself alive.
+KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3
 POOR_AREA, INSIDE = 0.2, 0.5  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
 COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
@@ -61,12 +61,15 @@ def found_hands(
     """
     telling = np.asarray(cv2.bitwise_or(views.changed, unknown), np.uint8)
     places = hand_places(telling, persons, config, step)
-    found = [(place, [blob for blob in blobs if _is_piece(blob, place)]) for place in places]
-    pieces = [id(blob) for _, parts in found for blob in parts]
-    whole = [blob for blob in blobs if id(blob) not in pieces]
-    missing = [(place, parts) for place, parts in found if not any(_covers(blob, place) for blob in whole)]
-    kept = [blob for blob in whole if not any(_is_arm(blob, place) for place, _ in missing)]
-    return kept + [blob for place, parts in missing if (blob := _blob(views, place, parts, config)).area]
+    # Of a hand that has moved on since the finder looked, blobs of skin say more.
+    current = [place for place in places if not place.person.is_outdated(place.hand.x, place.hand.y, step.now_ns)]
+    pieces = {id(place): [blob for blob in blobs if _is_piece(blob, place)] for place in current}
+    joined = {id(blob) for parts in pieces.values() for blob in parts}
+    whole = [blob for blob in blobs if id(blob) not in joined]
+    missing = [place for place in places if not any(_covers(blob, place) for blob in whole)]
+    arms = {id(blob) for blob in whole for place in missing if id(place) in pieces and _is_arm(blob, place)}
+    found = [_blob(views, place, pieces.get(id(place), []), config) for place in missing]
+    return [blob for blob in whole if id(blob) not in arms] + [blob for blob in found if blob.area]
 
 
 def hand_places(telling: Mask, persons: list[Person], config: TrackerConfig, step: Step) -> list[Place]:
@@ -88,36 +91,39 @@ def _places(telling: Mask, person: Person, config: TrackerConfig, step: Step) ->
     places: list[Place] = []
     for hand in person.around.hands(HAND, config.hand_odds - KEPT_ODDS):
         place = Place(person, hand)
-        if person.is_outdated(hand.x, hand.y, step.now_ns):
-            continue
-        sure = hand.odds >= config.hand_odds or _is_followed(place, step)
-        if sure and _may_be_there(telling, place, config) and all(_apart(place, other) for other in places):
+        came = _came(telling, place)
+        sure = hand.odds >= config.hand_odds or _is_followed(place, came, step)
+        if sure and _may_be_there(place, came, config) and all(_apart(place, other) for other in places):
             places.append(place)
     return places[:2]
 
 
-def _is_followed(place: Place, step: Step) -> bool:
+def _came(telling: Mask, place: Place) -> float:
+    """Share of a place where something has come before the room."""
+    half = USUAL * place.person.width
+    rows, columns = around(place.hand.x, place.hand.y, half, half, half, half).scaled(COARSE).window(*telling.shape)
+    part = telling[rows, columns]
+    return np.count_nonzero(part) / max(1, part.size)
+
+
+def _is_followed(place: Place, came: float, step: Step) -> bool:
     """Whether a hand was there just now: one that is held still is not lost where the finder doubts."""
     return any(
         step.now_ns - hand.likely_ns <= KEPT_SEEN_S * 1e9
-        and (is_shown(hand) or step.now_ns - hand.sure_ns <= KEPT_SURE_S * 1e9)
+        and (came >= CAME_NEAR or is_shown(hand))
         and math.dist(hand.last_seen, (place.hand.x, place.hand.y)) < REACH * place.person.width
         for hand in place.person.hands
     )
 
 
-def _may_be_there(telling: Mask, place: Place, config: TrackerConfig) -> bool:
+def _may_be_there(place: Place, came: float, config: TrackerConfig) -> bool:
     """Within reach, no shoulder, and where something has come before the room, unless the hand is seen very surely."""
     person, hand = place.person, place.hand
     away = person.distance(hand.x, hand.y)
     near = away < BESIDE
     if away >= config.reach or (near and hand.y > person.y + CHIN * person.width):
         return False
-    half = USUAL * person.width
-    rows, columns = around(hand.x, hand.y, half, half, half, half).scaled(COARSE).window(*telling.shape)
-    part = telling[rows, columns]
-    came = np.count_nonzero(part) / max(1, part.size)
-    return bool(came >= (CAME_NEAR if near else CAME)) or (not near and hand.odds >= config.hand_odds + VERY_SURELY)
+    return came >= (CAME_NEAR if near else CAME) or (not near and hand.odds >= config.hand_odds + VERY_SURELY)
 
 
 def _is_piece(blob: Blob, place: Place) -> bool:

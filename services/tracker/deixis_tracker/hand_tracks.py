@@ -116,11 +116,11 @@ class HandTracks:
         skin; and whether it was cut so. A track that was is cut so on, also where the finder doubts: a hand that leaps to
         and fro is none that is held still.
         """
-        if person.is_outdated(*hand.centroid, now_ns):
-            return hand, False
         width, kept = person.width, track is not None and now_ns - track.as_seen_ns <= KEPT_SEEN_S * 1e9
         least = self._config.hand_odds + (-KEPT_ODDS if kept else SURELY)
-        places = _seen_on(person, blob, min(least, max(NO_HAND, _hand_odds(person, hand) + LIKELIER)))
+        if not person.is_outdated(*hand.centroid, now_ns):
+            least = min(least, max(NO_HAND, _hand_odds(person, hand) + LIKELIER))
+        places = _seen_on(person, blob, least)
         if not places:
             return hand, False
         expected = (track.motion.x, track.motion.y) if kept and track is not None else hand.centroid
@@ -154,8 +154,6 @@ class HandTracks:
         track.watched_s += step.passed_s
         if self._may_be(person, hand):
             track.likely_ns = step.now_ns
-        if _hand_odds(person, hand) >= self._config.hand_odds:
-            track.sure_ns = step.now_ns
         track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
 
     def _may_be(self, person: Person, hand: Hand) -> bool:
@@ -185,8 +183,6 @@ class HandTracks:
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
             track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
             track.likely_ns = step.now_ns
-            if _hand_odds(person, hand) >= self._config.hand_odds:
-                track.sure_ns = step.now_ns
             track.belief.update(_features(person, track, hand, blob, odds), 1.0)
             person.hands.append(track)
 

@@ -49,7 +49,6 @@ class HandTrack:
     watched_s: float = 0.0  # time in which it was seen
     as_seen_ns: int = -(10**18)  # when the hand was cut out last where the finder saw it
     likely_ns: int = -(10**18)  # when the finder took it last for what may be a hand
-    sure_ns: int = -(10**18)  # when the finder saw a hand there last
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
     _middle: tuple[Points | None, tuple[float, float]] = field(default=(None, (0.0, 0.0)), repr=False, compare=False)
 
