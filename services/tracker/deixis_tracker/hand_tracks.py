@@ -31,7 +31,7 @@ ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the bl
 SURELY, LIKELIER = 0.4, 1.0
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
 UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, whatever its colour; blurred ones it misses a while
-EDGE_PX = 2
+EDGE_PX = 2  # a hand so near the picture's edge is cut by it
 
 Claim = tuple[Person, HandTrack]
 Odds = tuple[float, float]  # of a right and of a left hand
@@ -194,7 +194,7 @@ class HandTracks:
         kept = [hand for hand in person.hands if self._may_be_there(person, hand, step)]
         seen = [hand for hand in kept if hand.blob is not None and _is_likely(hand, step)]
         for hand in kept:
-            if not _is_likely(hand, step):
+            if hand.blob is not None and not _is_likely(hand, step):
                 hand.kind = "unknown"
         for hand, kind in zip(seen, label([h.belief for h in seen], [h.kind for h in seen]), strict=True):
             hand.kind = kind
