@@ -26,7 +26,9 @@ CHIN = 0.7  # head widths below the head
 # Share of a hand's place that differs from the room, so near the head, and log odds beyond doubtful ones by which it needs not.
 CAME, CAME_NEAR, VERY_SURELY = 0.15, 0.6, 1.5
 FOREARM = 2.2  # head widths from hand to arm
-NO_HAND = -1.0  # log odds of the finder below which there is surely no hand
+# Log odds of the finder below which there is surely no hand. This and what is below were chosen by
+# `deixis eval --stage tracker --seeds 1000:1016` and the known clips: hardly a true hand has less.
+NO_HAND = -1.0
 # Near a hand that was tracked so lately, places are believed down to so far below doubtful odds: near one that is surely
 # a hand, or where something has come before the room. What is doubtful and stands in the room does not keep itself alive.
 KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3
