@@ -63,6 +63,11 @@ def person():
     return somebody
 
 
+def strip(x, y):
+    """A blob about a place that is thinner than a hand."""
+    return Blob(np.ones((7, 24), np.uint8), x - 12, y - 3, 168, 1.0, 0.9)
+
+
 def test_a_gloved_hand_is_cut_out_by_the_colour_of_its_middle(person):
     image = np.full((480, 640, 3), 200, np.uint8)
     cv2.ellipse(image, HAND, (16, 8), 30, 0, 360, (160, 60, 20), -1)
@@ -144,18 +149,25 @@ def test_what_may_be_the_other_hand_is_no_forearm(person):
 
 def test_a_piece_of_a_hand_is_made_whole(person):
     look(person, {(LEFT_HAND, HAND): 2.0})
-    piece = square(HAND[0] + 10, HAND[1], 16)
+    piece = strip(HAND[0] + 10, HAND[1])
     blobs = found(WALL, [person], [piece], came=[HAND])
     assert len(blobs) == 1
     assert blobs[0].area > 2 * piece.area
     columns = np.nonzero(blobs[0].mask)[1] + blobs[0].x0
-    assert columns.max() >= HAND[0] + 17
+    assert columns.max() >= HAND[0] + 21
+
+
+def test_a_small_hand_that_colour_shows_is_left_as_it_is(person):
+    look(person, {(LEFT_HAND, HAND): 2.0})
+    hand = square(HAND[0] + 16, HAND[1], 16)
+    (blob,) = found(WALL, [person], [hand], came=[HAND])
+    assert blob is hand
 
 
 def test_of_a_hand_that_moves_quickly_skin_says_more_than_an_earlier_look(person):
     look(person, {(LEFT_HAND, HAND): 2.0})
     person.around_ns -= STEP.passed_ns
-    piece = square(HAND[0] + 10, HAND[1], 16)
+    piece = strip(HAND[0] + 10, HAND[1])
     person.hands = [tracked(*HAND)]
     assert not any(blob is piece for blob in found(WALL, [person], [piece], came=[HAND]))
     person.hands = [tracked(*HAND, speed=8 * WIDTH)]

@@ -32,7 +32,7 @@ NO_HAND = -1.0
 # Near a hand that was tracked so lately, places are believed down to so far below doubtful odds: near one that is surely
 # a hand, or where something has come before the room. What is doubtful and stands in the room does not keep itself alive.
 KEPT_ODDS, KEPT_SEEN_S = 1.0, 0.3
-POOR_AREA, INSIDE = 0.2, 0.5  # head widths squared; share of a piece of a hand that lies where the finder sees the hand
+INSIDE = 0.5  # share of a blob that lies where the finder sees the hand
 COVERED = 0.25  # share of the square about a hand's middle
 ONE_HAND = 0.45  # head widths: two places of a hand that are nearer to each other are one
 ALIKE = 2.5  # deviations of the colour of what is surely hand
@@ -65,7 +65,7 @@ def found_hands(
     places = hand_places(telling, persons, config, step)
     # Of a hand that has moved on since the finder looked, blobs of skin say more.
     current = [place for place in places if not place.person.is_outdated(place.hand.x, place.hand.y, step.now_ns)]
-    pieces = {id(place): [blob for blob in blobs if _is_piece(blob, place)] for place in current}
+    pieces = {id(place): [blob for blob in blobs if _is_piece(blob, place, config)] for place in current}
     joined = {id(blob) for parts in pieces.values() for blob in parts}
     whole = [blob for blob in blobs if id(blob) not in joined]
     missing = [place for place in places if not any(_covers(blob, place) for blob in whole)]
@@ -128,17 +128,18 @@ def _may_be_there(place: Place, came: float, config: TrackerConfig) -> bool:
     return came >= (CAME_NEAR if near else CAME) or (not near and hand.odds >= config.hand_odds + VERY_SURELY)
 
 
-def _is_piece(blob: Blob, place: Place) -> bool:
-    """Whether a blob is a poor piece of that hand, of which colour has not given the rest."""
+def _is_piece(blob: Blob, place: Place, config: TrackerConfig) -> bool:
+    """Whether a blob is a piece of that hand that is too small or too thin to be taken for one."""
     w = place.person.width
-    if not (blob.area < POOR_AREA * w * w or thickness(blob.mask) < LEAST_THICKNESS * w):
-        return False
-    rows, columns = place.box.window(10**6, 10**6)
-    inside = blob.mask[
-        max(0, rows.start - blob.y0) : max(0, rows.stop - blob.y0),
-        max(0, columns.start - blob.x0) : max(0, columns.stop - blob.x0),
-    ]
-    return bool(np.count_nonzero(inside) >= INSIDE * blob.area)
+    poor = blob.area < config.min_hand_area * w * w or thickness(blob.mask) < LEAST_THICKNESS * w
+    return poor and _lies_in(blob, place)
+
+
+def _lies_in(blob: Blob, place: Place) -> bool:
+    """Whether most of a blob lies where the hand may be."""
+    left, top = place.box.x - blob.x0, place.box.y - blob.y0
+    rows, columns = place.box._replace(x=left, y=top).window(*blob.mask.shape)
+    return bool(np.count_nonzero(blob.mask[rows, columns]) >= INSIDE * blob.area)
 
 
 def _is_arm(blob: Blob, place: Place) -> bool:
@@ -162,11 +163,11 @@ def _apart(place: Place, other: Place) -> bool:
 
 
 def _covers(blob: Blob, place: Place) -> bool:
-    """Whether a blob has a good part of where the hand is."""
+    """Whether a blob has a good part of where the hand is, or is the hand's better part."""
     half = USUAL * place.person.width
     box = around(place.hand.x - blob.x0, place.hand.y - blob.y0, half, half, half, half)
     rows, columns = box.window(*blob.mask.shape)
-    return bool(np.count_nonzero(blob.mask[rows, columns]) >= COVERED * (2 * half) ** 2)
+    return bool(np.count_nonzero(blob.mask[rows, columns]) >= COVERED * (2 * half) ** 2) or _lies_in(blob, place)
 
 
 def _blob(views: Views, place: Place, pieces: list[Blob], config: TrackerConfig) -> Blob:
