@@ -3,9 +3,11 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
+from deixis_tracker.camera_motion import Shift
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import (
     BREADTH,
+    HAND,
     HEAD,
     LEFT_HAND,
     RIGHT_HAND,
@@ -66,6 +68,16 @@ def test_odds_are_read_where_a_thing_is_and_nowhere_outside():
     assert around.odds_near(LEFT_HAND, hand.x + 80, hand.y, 4.0) < -9
     assert around.odds_near(RIGHT_HAND, hand.x, hand.y, 4.0) == -9
     assert around.odds_near(LEFT_HAND, -500, 0, 4.0) == -np.inf
+
+
+def test_doubt_whose_hand_it_is_is_no_doubt_that_it_is_one():
+    maps = maps_with(LEFT_HAND, 10, 8)
+    maps[RIGHT_HAND] = maps[LEFT_HAND]
+    around = Surroundings(maps, 0, 0, 1.0)
+    left, hand = around.hands(LEFT_HAND, 0.0)[0], around.hands(HAND, 0.0)[0]
+    assert hand[:2] == pytest.approx(left[:2], abs=0.5)
+    assert hand.odds == pytest.approx(left.odds + np.log(2), abs=1e-3)
+    assert around.moved(Shift.none()).hands(HAND, 0.0)[0].odds == pytest.approx(hand.odds)
 
 
 def test_of_heads_on_one_another_the_best_is_kept():

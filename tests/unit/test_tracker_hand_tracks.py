@@ -98,5 +98,56 @@ def test_it_does_not_leap_while_the_finder_doubts_for_a_moment(person):
     assert np.ptp(places) < 3
 
 
-def test_a_finder_that_never_was_sure_cuts_nothing_out(person):
-    assert followed(person, [0.7] * 3)[-1] != pytest.approx(285, abs=12)
+def test_a_finder_that_sees_as_much_at_the_end_cuts_nothing_out(person):
+    person.hands = [hand_at(1, "right_hand", 270, 235)]
+    maps = np.full((4, 120, 160), 0.5, np.float32)
+    maps[RIGHT_HAND, 250 // STRIDE, 285 // STRIDE] = 0.7
+    person.around, person.around_ns = Surroundings(maps, 0, 0, 1.0), STEP.now_ns
+    hand_and_wall = Blob(np.ones((30, 90), np.uint8), 210, 235, 2700, 1.0, 0.9)
+    HandTracks((480, 640), TrackerConfig(), count(3)).update([person], [hand_and_wall], STEP)
+    assert person.hands[0].blob.centroid[0] != pytest.approx(285, abs=12)
+
+
+def found_on(person, blob, places, frames=1):
+    """Kinds of the tracks after so many frames of one blob, and the hands; the finder sees hands of log odds at places."""
+    tracks = HandTracks((480, 640), TrackerConfig(), count(3))
+    maps = np.full((4, 120, 160), -9.0, np.float32)
+    for (x, y), odds in places.items():
+        maps[RIGHT_HAND, y // STRIDE, x // STRIDE] = odds
+    for k in range(frames):
+        now_ns = STEP.now_ns + k * STEP.passed_ns
+        person.around, person.around_ns = Surroundings(maps, 0, 0, 1.0), now_ns
+        tracks.update([person], [blob], Step(now_ns, now_ns, STEP.passed_ns))
+    return person.hands
+
+
+def test_the_end_of_a_raised_arm_that_looks_like_no_hand_is_its_elbow(person):
+    person.hands = []
+    arm = Blob(np.ones((110, 30), np.uint8), 300, 150, 3300, 1.0, 0.9)
+    (hand,) = found_on(person, arm, {(315, 165): -0.3})
+    assert hand.blob.centroid[1] < 190
+
+
+def test_what_the_finder_rules_out_begins_no_track(person):
+    person.hands = []
+    blob = Blob(np.ones((30, 30), np.uint8), 280, 240, 900, 1.0, 0.9)
+    assert found_on(person, blob, {}) == []
+    assert len(found_on(person, blob, {(295, 255): -0.5})) == 1
+
+
+def test_what_the_finder_rules_out_for_long_is_called_no_hand(person):
+    person.hands = person.hands[:1]
+    person.hands[0].likely_ns = STEP.now_ns
+    blob = Blob(np.ones((30, 30), np.uint8), 280, 240, 900, 1.0, 0.9)
+    (hand,) = found_on(person, blob, {}, frames=4)
+    assert hand.kind == "right_hand"
+    person.hands[0].likely_ns = STEP.now_ns
+    (hand,) = found_on(person, blob, {}, frames=10)
+    assert hand.kind == "unknown"
+
+
+def test_of_a_hand_that_the_picture_cuts_the_finder_may_see_nothing(person):
+    person.hands = []
+    blob = Blob(np.ones((30, 30), np.uint8), 280, 450, 900, 1.0, 0.9)
+    person.motion = PointFilter(320, 280, 1.0, 1000.0)
+    assert len(found_on(person, blob, {})) == 1

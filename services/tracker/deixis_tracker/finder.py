@@ -31,6 +31,7 @@ PIXEL_MIDDLE, PIXEL_SPREAD = 115.0, 60.0
 WIDTH_PER_BREADTH = HEAD_WIDTH_M / 0.185  # width of a head, by its breadth ear to ear, which the network was fitted to
 KNOWN_PX = (6.5, 30.0)  # breadths of heads that it knows
 HEAD, RIGHT_HAND, LEFT_HAND, BREADTH = range(4)
+HAND = 4  # made of the two maps of hands: of whichever side
 SEARCHED_PX, SHARED_PX = 320, 64  # longest side of what is searched at once, and how far parts of a picture overlap
 LEAST_SHRUNK = 1.5  # pixels of the frame that are made one, at least: noise fills what is finer
 LEAST_SIDE_PX = 48  # a smaller picture shows no head with what is around it
@@ -53,7 +54,8 @@ class Surroundings:
 
     def __init__(self, maps: Maps, x0: float, y0: float, scale: float) -> None:
         """`maps` (4, h, w) of a part of the picture whose corner is at (x0, y0), `scale` of its pixels to one of theirs."""
-        self._maps = maps
+        # Of an arm held across the body the network doubts whose hand it is, not that it is one: it shares out the odds.
+        self._maps = np.concatenate([maps, np.logaddexp(maps[RIGHT_HAND], maps[LEFT_HAND])[None]])
         self._x0, self._y0, self._scale = x0, y0, scale
         self._summits: dict[int, tuple[list[float], list[tuple[int, int]]]] = {}
         self._seen: dict[tuple[int, int, int], Seen] = {}
@@ -62,14 +64,14 @@ class Surroundings:
         """The same maps where the room has moved."""
         height, width = (0.5 * STRIDE * self._scale * side for side in self._maps.shape[1:])
         x, y = shift.moved(self._x0 + width, self._y0 + height)
-        return Surroundings(self._maps, x - width, y - height, self._scale)
+        return Surroundings(self._maps[:HAND], x - width, y - height, self._scale)
 
     def heads(self, least: float) -> list[Seen]:
         """Heads of so high log odds, best first."""
         return self._peaks(HEAD, least)
 
     def hands(self, kind: int, least: float) -> list[Seen]:
-        """Right or left hands of so high log odds, best first."""
+        """Right or left hands, or of either side (HAND), of so high log odds, best first."""
         return self._peaks(kind, least)
 
     def odds_near(self, kind: int, x: float, y: float, reach: float) -> float:

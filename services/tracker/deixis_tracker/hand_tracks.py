@@ -9,10 +9,10 @@ import numpy as np
 
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.finder import LEFT_HAND, RIGHT_HAND
-from deixis_tracker.found_hands import REACH
+from deixis_tracker.finder import HAND, LEFT_HAND, RIGHT_HAND
+from deixis_tracker.found_hands import KEPT_ODDS, KEPT_SEEN_S, NO_HAND, REACH
 from deixis_tracker.frame import Step
-from deixis_tracker.hands import Hand, cut_hand, hand_about, thickness
+from deixis_tracker.hands import LEAST_THICKNESS, Hand, cut_hand, hand_about, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import MOST_HANDS, HandTrack, Person, is_shown
@@ -27,9 +27,11 @@ LEAST_SUPPORT = 0.15
 ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the blob's
 # A hand is cut out where the finder sees it if its log odds are so far beyond doubtful ones, and then on down to so far below,
 # for so long. Chosen among 0.4, 0.8, 0.9, never, and with or without KEPT, by `deixis eval --stage tracker --seeds 1000:1012`.
-SURELY, KEPT_ODDS, KEPT_SEEN_S = 0.4, 1.0, 0.3
-ELSEWHERE, FAR_ELSEWHERE = 0.3, 1.5  # head widths from the end of the blob
-LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
+# Or if they are so much higher than at the end of the blob, which may be an elbow.
+SURELY, LIKELIER = 0.4, 1.0
+ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
+UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, whatever its colour; blurred ones it misses a while
+EDGE_PX = 2  # a hand so near the picture's edge is cut by it
 
 Claim = tuple[Person, HandTrack]
 Odds = tuple[float, float]  # of a right and of a left hand
@@ -115,7 +117,10 @@ class HandTracks:
         and fro is none that is held still.
         """
         width, kept = person.width, track is not None and now_ns - track.as_seen_ns <= KEPT_SEEN_S * 1e9
-        places = _seen_on(person, blob, self._config.hand_odds + (-KEPT_ODDS if kept else SURELY))
+        least = self._config.hand_odds + (-KEPT_ODDS if kept else SURELY)
+        if not person.is_outdated(*hand.centroid, now_ns):
+            least = min(least, max(NO_HAND, _hand_odds(person, hand) + LIKELIER))
+        places = _seen_on(person, blob, least)
         if not places:
             return hand, False
         expected = (track.motion.x, track.motion.y) if kept and track is not None else hand.centroid
@@ -143,9 +148,23 @@ class HandTracks:
     def _take_in(self, person: Person, track: HandTrack, hand: Hand, blob: Blob, odds: Odds, step: Step) -> None:
         track.pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
         track.blob, track.seen_ns = hand, step.now_ns
+        if blob.owner is not None:
+            track.as_seen_ns = step.now_ns
         track.on_arm = hand.arm_length_px > 1.2 * self._config.hand_length * person.width
         track.watched_s += step.passed_s
+        if self._may_be(person, hand):
+            track.likely_ns = step.now_ns
         track.evidence = max(step.kept(EVIDENCE_KEPT) * track.evidence, blob.evidence, _share(max(odds)))
+
+    def _may_be(self, person: Person, hand: Hand) -> bool:
+        """Whether the finder does not rule a hand out there. Of one that the picture cuts it may see too little."""
+        return person.around is None or _hand_odds(person, hand) >= NO_HAND or self._is_cut(hand)
+
+    def _is_cut(self, hand: Hand) -> bool:
+        (height, width), (rows, columns) = self._size, np.nonzero(hand.mask)
+        left, top = hand.x0 + columns.min(), hand.y0 + rows.min()
+        right, bottom = hand.x0 + columns.max(), hand.y0 + rows.max()
+        return bool(min(left, top, width - 1 - right, height - 1 - bottom) <= EDGE_PX)
 
     def _find_hand(self, persons: list[Person], blob: Blob, step: Step) -> None:
         """Take a blob that no track holds for a lost hand that is seen again, or for a new one."""
@@ -153,7 +172,7 @@ class HandTracks:
         owners = [person for person in persons if person.person_id == blob.owner]
         person = min(owners or persons, key=lambda p: math.hypot(x - p.x, (y - p.y) * 0.7) / p.width)
         hand = self._cut(person, blob, None, x, step.now_ns)
-        if hand is None or person.distance(*hand.centroid) > self._config.reach:
+        if hand is None or person.distance(*hand.centroid) > self._config.reach or not self._may_be(person, hand):
             return
         track, odds = _lost_hand(person, hand, step), _odds(person, hand, self._config.hand_odds)
         if track is not None:  # a blurred hand is lost for some frames, and comes to rest somewhere else
@@ -163,6 +182,7 @@ class HandTracks:
             motion = PointFilter(*hand.centroid, 0.1 * person.width, HAND_ACCELERATION * person.width)
             pixels = sample_pixels(hand.mask, hand.x0, hand.y0)
             track = HandTrack(next(self._ids), motion, pixels, hand, step.now_ns, evidence=blob.evidence)
+            track.likely_ns = step.now_ns
             track.belief.update(_features(person, track, hand, blob, odds), 1.0)
             person.hands.append(track)
 
@@ -172,7 +192,10 @@ class HandTracks:
             if hand.blob is None:
                 hand.motion.damp(step.kept(UNSEEN_SPEED_KEPT))
         kept = [hand for hand in person.hands if self._may_be_there(person, hand, step)]
-        seen = [hand for hand in kept if hand.blob is not None]
+        seen = [hand for hand in kept if hand.blob is not None and _is_likely(hand, step)]
+        for hand in kept:
+            if hand.blob is not None and not _is_likely(hand, step):
+                hand.kind = "unknown"
         for hand, kind in zip(seen, label([h.belief for h in seen], [h.kind for h in seen]), strict=True):
             hand.kind = kind
         shown = {hand.kind for hand in seen if is_shown(hand)}
@@ -185,12 +208,21 @@ class HandTracks:
         return near and recent and 0 <= x < width and 0 <= y < height
 
 
+def _hand_odds(person: Person, hand: Hand) -> float:
+    """The finder's log odds of a hand there, of either side; -inf outside of what it has looked at."""
+    return person.around.odds_near(HAND, *hand.centroid, ODDS_NEAR * person.width) if person.around is not None else -math.inf
+
+
+def _is_likely(hand: HandTrack, step: Step) -> bool:
+    return step.now_ns - hand.likely_ns <= UNLIKELY_S * 1e9
+
+
 def _seen_on(person: Person, blob: Blob, least: float) -> list[tuple[float, float]]:
     """Where the finder sees hands on a blob."""
     if person.around is None:
         return []
     height, width = blob.mask.shape
-    seen = [(one.x, one.y) for kind in (RIGHT_HAND, LEFT_HAND) for one in person.around.hands(kind, least)]
+    seen = [(one.x, one.y) for one in person.around.hands(HAND, least)]
     cells = [(round(x - blob.x0), round(y - blob.y0)) for x, y in seen]
     inside = [0 <= column < width and 0 <= row < height and bool(blob.mask[row, column]) for column, row in cells]
     return [place for place, on_blob in zip(seen, inside, strict=True) if on_blob]

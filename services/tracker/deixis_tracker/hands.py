@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from deixis_tracker.frame import Mask
 from deixis_tracker.growth import farthest, within
 
+LEAST_THICKNESS = 0.22  # head widths; folds of a sleeve and rims of furniture are thinner
 CELLS_PER_WIDTH = 12  # resolution at which ways along an arm are measured
 NEAR_SHOULDER = 1.2  # head widths: a blob that starts so near the shoulder starts with the upper arm
 

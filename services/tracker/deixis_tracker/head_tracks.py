@@ -93,6 +93,7 @@ class HeadTracks:
         seen = None
         if step.periods(SHAPE_S, person.person_id * STAGGERED_S):
             person.around = self._shapes.around(views.full, person.x, person.y, person.width)
+            person.around_ns = step.now_ns
             seen = self._seen_as_shape(person)
         picture, scale = (views.coarse, COARSE) if person.width >= LEAST_COARSE_HEAD_PX else (views.full, 1.0)
         found = self._colours.find(picture, person.colours, scale * person.x, scale * person.y, scale * person.width, 0.5)
@@ -229,6 +230,7 @@ class HeadTracks:
         now_ns = step.now_ns
         person = Person(next(self._person_ids), next(self._ids), motion, width, HeadColours(), now_ns, now_ns)
         person.around = self._shapes.around(views.full, x, y, width)
+        person.around_ns = now_ns
         person.colours.learn(views.full, person.x, person.y, width, 1.0)
         self.persons.append(person)
         if _look(person, views) is not None:

@@ -30,6 +30,7 @@ FACE_ABOVE, FACE_BELOW = 0.52, 0.66
 
 SHOWN_EVIDENCE = 0.25
 SHOWN_AFTER_S = 0.06  # of watching
+QUICK, QUICK_NEAR = 4.0, 1.5  # head widths a second; head widths from such a hand that an earlier look says nothing of
 SHOWN_LOST_S = 0.2  # a hand is published so long after it was seen last
 
 
@@ -47,6 +48,7 @@ class HandTrack:
     evidence: float = 0.0
     watched_s: float = 0.0  # time in which it was seen
     as_seen_ns: int = -(10**18)  # when the hand was cut out last where the finder saw it
+    likely_ns: int = -(10**18)  # when the finder took it last for what may be a hand
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
     _middle: tuple[Points | None, tuple[float, float]] = field(default=(None, (0.0, 0.0)), repr=False, compare=False)
 
@@ -82,7 +84,8 @@ class Person:
     frontal: FrontalFace | None = None  # as measured in this frame, in its pixels
     skin_centre: tuple[float, float] | None = None
     hands: list[HandTrack] = field(default_factory=list)
-    around: Surroundings | None = None  # what the finder sees around the head in this frame
+    around: Surroundings | None = None  # what the finder saw around the head
+    around_ns: int = -(10**18)  # when
 
     @property
     def x(self) -> float:
@@ -118,6 +121,14 @@ class Person:
         """Where hands hang. Above it a hand is raised, and has come there since the room was learned."""
         w = self.width
         return Box(self.x - 1.7 * w, self.y + 2.4 * w, 3.4 * w, 3.8 * w)
+
+    def is_outdated(self, x: float, y: float, now_ns: int) -> bool:
+        """Whether what the finder saw at a place is of an earlier frame, and a hand of the person moves there quickly."""
+        return self.around_ns < now_ns and any(
+            math.hypot(hand.motion.vx, hand.motion.vy) > QUICK * self.width
+            and math.hypot(hand.motion.x - x, hand.motion.y - y) < QUICK_NEAR * self.width
+            for hand in self.hands
+        )
 
     def shoulder(self, x: float) -> tuple[float, float]:
         """The shoulder on the side of the picture where `x` is."""

@@ -105,7 +105,7 @@ class Tracker:
         persons = self._heads.persons
         if persons:
             blobs = hand_blobs(views, self._skin, self._room, self._motion, persons, self._config)
-            blobs += found_hands(views, persons, blobs, self._config)
+            blobs = found_hands(views, self._room.unknown, persons, blobs, self._config, step)
             self._hands.update(persons, blobs, step)
             self._find_fingers(persons, views)
         self._people = people_mask(persons, (views.skin.shape[0], views.skin.shape[1]))
