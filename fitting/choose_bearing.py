@@ -18,6 +18,7 @@ from deixis_evaluation.chosen_clips import Choice, choose
 from deixis_evaluation.clips import Clip
 from deixis_evaluation.episode_scores import strokes_of
 from deixis_evaluation.gesture_play import GestureSetup, play_gestures
+from deixis_fusion.config import HandConfig
 from deixis_gesture import bearing, person
 from deixis_gesture.bearing import BEARINGS, ArmSight, Bearing, Floats, estimate_bearing
 from deixis_schemas.messages import Side
@@ -31,8 +32,8 @@ TRIED = {
     "DIRECTION_SIGMA": (0.2, 0.35, 0.6),
 }
 LEAST_FRAMES = 5
-BLUR_DEG, NONSENSE = 6.0, 0.15
-"""As fusion reads bearings (`hand.sigma_floor_deg`, `hand.outlier`)."""
+BLUR_DEG, NONSENSE = HandConfig().sigma_floor_deg, HandConfig().outlier
+"""As fusion reads bearings."""
 Asked = tuple[ArmSight, Side | None]
 
 
