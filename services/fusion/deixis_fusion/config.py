@@ -45,8 +45,8 @@ class HandConfig(StageConfig):
     miss: float = Field(default=0.25, ge=0, le=1, description="Probability that a finger within that range is missed.")
     refinement: float = Field(default=0.9, ge=0, le=1, description="Part of each region's mass given to its POIs.")
     discount: float = Field(default=0.08, ge=0, le=1, description="Mass kept on the whole frame.")
-    # These two by `deixis eval --stage fusion --seeds 0:20 --kinds point --set fusion.hand.NAME=VALUE`: calibration error .167 with
-    # 6 and .15 as they were before the stage's likelihood counted fingers lost, .108 with 4, .124 with .05.
+    # These two by `deixis eval --stage fusion --seeds 0:20 --kinds point --set fusion.hand.NAME=VALUE`: calibration error .167
+    # with 6 and .15, as they were before the stage's likelihood counted fingers lost; .108 with 4, .124 with .05.
     sigma_floor_deg: float = Field(default=4, ge=0, le=90, description="Error of the hand's bearing at least.")
     outlier: float = Field(default=0.05, gt=0, lt=1, description="Probability that the hand's bearing is nonsense.")
 
