@@ -216,6 +216,16 @@ def test_a_hand_that_is_held_still_is_still_for_a_camera_that_turns():
     assert sum(a != b for a, b in zip(still, turning, strict=True)) <= 4
 
 
+@pytest.mark.parametrize("x", [60.0, 560.0])
+def test_a_hand_at_rest_is_at_rest_wherever_in_the_picture_while_the_faces_width_is_measured_better(x):
+    arm, phases = Arm(GestureConfig(), 0.0), []
+    for i in range(45):
+        face = Face(x, 150.0, FACE_PX * (1 + 0.1 * math.exp(-i / 20)))
+        arm.update(_hand((0.4, 4.3), (), x=x), face, (0.0, 0.0), i / 30, 1 / 30)
+        phases.append(arm.phase)
+    assert set(phases[2:]) == {"idle"}
+
+
 @pytest.mark.parametrize("rate_hz", [10, 30, 60])
 def test_a_hand_changes_its_side_as_fast_at_any_frame_rate(rate_hz):
     arm, face, changed_s = Arm(GestureConfig(), 0.0), Face(320.0, 150.0, FACE_PX), None

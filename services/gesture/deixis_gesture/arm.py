@@ -41,6 +41,8 @@ class Arm:
         self._leftness = 0.0
         self._measures: deque[tuple[float, HandSight]] = deque()
         self._place_px = (0.0, 0.0)
+        self._gone: Point = (0.0, 0.0)
+        self._last: tuple[Point, Point] | None = None  # in the picture, pixels; and how far the room had moved
         self.track_id = -1
         self.seen_s = -math.inf
         self.fingers: list[Finger] = []
@@ -101,8 +103,7 @@ class Arm:
         hand = self._shape(track, face)
         place = hand.centroid if hand else _about(face, track.centroid_px)
         self.stretch = math.dist(place, CHEST)
-        in_room = (place[0] + face.x_px / face.width_px - room[0], place[1] + face.y_px / face.width_px - room[1])
-        phase = self._phases.update(time_s, in_room, place, walking)
+        phase = self._phases.update(time_s, self._gone_to(face, place, room), place, walking)
         self.fingers = find_fingers(hand) if hand and phase != "idle" else []
         if phase != "stroke":
             self._stroke, self._verdict = self._new_stroke(), Verdict()
@@ -110,6 +111,22 @@ class Arm:
         elif hand:
             self._verdict = self._stroke.add(self._look(hand, time_s, fellow))
             self._measure(hand, time_s)
+
+    def _gone_to(self, face: Face, place: Point, room: Point) -> Point:
+        """Where the hand is in the room, face widths from where it was seen first.
+
+        Summed step by step: the face's width breathes, and a hand 600 pixels from the picture's corner seemed to move by half
+        a face width a second, measured from there: it was never at rest, so that nothing was known of where it came from.
+        """
+        x, y = face.pixels(place)
+        if self._last is not None:
+            (last_x, last_y), (room_x, room_y) = self._last
+            self._gone = (
+                self._gone[0] + (x - last_x) / face.width_px - (room[0] - room_x),
+                self._gone[1] + (y - last_y) / face.width_px - (room[1] - room_y),
+            )
+        self._last = (x, y), room
+        return self._gone
 
     def _new_stroke(self) -> StrokeRules:
         return PaperStroke(self._config.settle_s) if self._config.rules == "paper" else DeixisStroke(self._config)
