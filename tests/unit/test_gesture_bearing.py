@@ -32,13 +32,13 @@ def sight_of(tip, fist, distance=DISTANCE, height=0.0):
 
 def held_arms(count, seed=1):
     """Arms like those of the file, each a mixture of two neighbours, so that none is one of them."""
-    arms, rng = bearing.load_arms(), np.random.default_rng(seed)
-    half = len(arms.tips) // 2
-    with np.errstate(divide="ignore"):
-        truth = BEARINGS[arms.share[:, :half].argmax(axis=0)]
-    for k in rng.integers(0, half, count):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        side = str(rng.choice(["left", "right"]))
+        arms = bearing.load_arms(side)
+        k = int(rng.integers(len(arms.tips)))
         missed = rng.normal(0, bearing.TIP_SIGMA, 3)
-        yield truth[k], ("left" if arms.left[k] else "right"), arms.tips[k] + missed, arms.fists[k] + missed
+        yield BEARINGS[arms.share[k].argmax()], side, arms.tips[k] + missed, arms.fists[k] + missed
 
 
 @settings(deadline=None)  # the first example loads the arms

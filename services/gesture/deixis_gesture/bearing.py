@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.floating[Any]]
 
 BEARINGS = np.arange(-180.0, 180.0, BEARING_STEP_DEG)
+ARM_SIDES: tuple[Side | None, ...] = ("left", "right", None)
 NEAR_DEG = 5.0
 """How far the arms of a bearing go on telling of its neighbours."""
 TIP_SIGMA, FAR_TIP_SIGMA = 0.15, 0.03
@@ -33,6 +34,8 @@ NEAREST = 0.3
 """Of the person's distance: no arm comes nearer to the camera."""
 NO_ARM = 0.005
 """Likelihood, beside the largest, of what no arm does."""
+LOG_NOBODY, LOG_NEGLIGIBLE = -20.0, 14.0
+"""Log of the fit below which a tip is nobody's; and arms so far below the likeliest are not looked at any closer."""
 LEAST_SIGMA_DEG = 8.0
 LEAST_EXTENT = 0.3
 """From the fist's middle to the end of its outline, face widths, where no finger shows."""
@@ -106,20 +109,20 @@ def estimate_bearing(seen: ArmSight, side: Side | None) -> Bearing:
 
 def arms_likelihood(seen: ArmSight, side: Side | None) -> Floats:
     """How likely each of BEARINGS puts fingertip and fist there, its largest 1."""
-    arms = load_arms()
-    tips, fists = _seen_at(arms.tips, seen), _seen_at(arms.fists, seen)
-    off = tips[:, :2] - (seen.tip.aside, seen.tip.slope)
-    sigma = np.hypot(TIP_SIGMA, FAR_TIP_SIGMA * arms.lengths)
-    fits = np.exp(-0.5 * np.sum((off * tips[:, 2:]) ** 2, axis=1) / sigma**2) / sigma**2
+    arms = load_arms(side)
+    tips = _seen_at(arms.tips, seen)
+    off = tips[:, :2] - np.array([seen.tip.aside, seen.tip.slope], np.float32)
+    off *= tips[:, 2:]
+    log_fits = -0.5 * np.einsum("ij,ij->i", off, off) / arms.sigmas**2 - 2 * np.log(arms.sigmas)
+    most = float(log_fits.max())
+    if most < LOG_NOBODY:
+        return np.ones(len(BEARINGS))  # nobody's arm: nothing is told
+    near = np.flatnonzero(log_fits > most - LOG_NEGLIGIBLE)
+    ways = seen.distance * (tips[near] - _seen_at(arms.fists[near], seen))[:, :2]
     way = np.array([seen.tip.aside - seen.fist.aside, seen.tip.slope - seen.fist.slope])
-    fits = fits * _with_outliers(_finger_fits(seen.distance * (tips - fists)[:, :2], seen.distance * way))
-    if side is not None:
-        fits = np.where(arms.left == (side == "left"), fits, 0.0)
-    likelihood = arms.share @ fits
-    most = float(likelihood.max())
-    if most < 1e-12:  # nobody's arm: nothing is told
-        return np.ones(len(BEARINGS))
-    return np.asarray((1 - NO_ARM) * likelihood / most + NO_ARM)
+    fits = np.exp(log_fits[near]) * _with_outliers(_finger_fits(ways, seen.distance * way))
+    likelihood = fits @ arms.share[near]
+    return np.asarray((1 - NO_ARM) * likelihood / float(likelihood.max()) + NO_ARM)
 
 
 def _seen_at(places: Floats, seen: ArmSight) -> Floats:
@@ -142,29 +145,30 @@ def _finger_fits(expected: Floats, way: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Arms:
-    """tips, fists (n, 3): right, up, toward the camera from the head; left (n,); lengths (n,); share (bearings, n): to which
-    bearing an arm counts, each row's sum 1.
+    """tips, fists (n, 3): right, up, toward the camera from the head; sigmas (n,): how far off a tip is measured; share (n,
+    bearings): to which bearing an arm counts, each column's sum over both sides 1.
     """
 
     tips: Floats
     fists: Floats
-    left: NDArray[np.bool_]
-    lengths: Floats
+    sigmas: Floats
     share: Floats
 
 
 @cache
-def load_arms() -> Arms:
-    """The arms and their mirror images, for either hand does the same."""
+def load_arms(side: Side | None) -> Arms:
+    """The arms of a side, and the mirror images of the other, for either hand does the same; of both where it is not known."""
     with files("deixis_gesture").joinpath("arms.npz").open("rb") as file:
         stored = np.load(file)
         bearings, left = stored["bearings_deg"], stored["left"]
         tips, fists = (np.concatenate([at, at * (-1, 1, 1)]).astype(np.float32) for at in (stored["tips"], stored["fists"]))
-    bearings = np.concatenate([bearings, -bearings]).astype(np.float32)
-    off = (BEARINGS[:, None] - bearings + 180) % 360 - 180
+    bearings, left = np.concatenate([bearings, -bearings]).astype(np.float32), np.concatenate([left, ~left])
+    off = (BEARINGS - bearings[:, None] + 180) % 360 - 180
     share = np.exp(-0.5 * (off / NEAR_DEG) ** 2)
-    share = (share / share.sum(axis=1, keepdims=True)).astype(np.float32)
-    return Arms(tips, fists, np.concatenate([left, ~left]), np.linalg.norm(tips, axis=1), share)
+    share = (share / share.sum(axis=0)).astype(np.float32)
+    of_side = np.full(len(left), True) if side is None else left == (side == "left")
+    sigmas = np.hypot(TIP_SIGMA, FAR_TIP_SIGMA * np.linalg.norm(tips, axis=1))
+    return Arms(tips[of_side], fists[of_side], sigmas[of_side], share[of_side])
 
 
 def _with_outliers(fits: Floats) -> Floats:

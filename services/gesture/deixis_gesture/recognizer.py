@@ -8,7 +8,7 @@ from deixis_runtime.lens import Lens
 from deixis_schemas.messages import CameraMount, Gesture, Track
 from deixis_schemas.runs import RunClock
 
-from .bearing import load_arms
+from .bearing import ARM_SIDES, load_arms
 from .config import GestureConfig
 from .person import Person, View
 from .pointing_odds import frame_odds, stroke_odds
@@ -20,7 +20,8 @@ class GestureRecognizer:
     """Follows the hands of every person. Pure: the same tracks at the same times give the same gestures."""
 
     def __init__(self, config: GestureConfig) -> None:
-        load_arms()  # now, not within the first pointing
+        for side in ARM_SIDES:
+            load_arms(side)  # now, not within the first pointing
         frame_odds(), stroke_odds()
         self._config = config
         self._persons: dict[int, Person] = {}

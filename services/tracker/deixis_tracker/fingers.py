@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from deixis_tracker.frame import COARSE, Image, Mask
 from deixis_tracker.hands import Hand
 
-Colours = NDArray[np.floating[Any]]  # (H, W, 3)
+Colours = NDArray[np.floating[Any]]  # (..., 3)
 
 REACH = 0.55  # head widths beyond the outline: an index finger
 LEAST_SHARE = 0.4  # of the hand in a mix
 DARKEST, BRIGHTEST = 0.45, 1.5  # of the hand's light
 LEAST_CONTRAST = 14.0  # grey levels (root of the sum over the channels) between what is seen and the room
-GAP = np.ones((3, 3), np.uint8)  # an edge of the room behind a finger is bridged
+GAP = np.ones((5, 5), np.uint8)  # an edge of the room behind a finger is bridged
 NOISE = 14.0  # grey levels that no mix explains
 CLEARLY = 40.0  # grey levels between hand and room: then what equals the room is no hand
 MOST_TAKEN = 0.4  # of an outline; where more of it equals the room, the room is remembered wrongly
@@ -41,39 +41,71 @@ def with_fingers(hand: Hand, picture: Image, room: Image, covered: Mask, head_wi
     x1, y1 = min(picture.shape[1], hand.x0 + width + reach), min(picture.shape[0], hand.y0 + height + reach)
     mask = np.zeros((y1 - y0, x1 - x0), np.uint8)
     mask[hand.y0 - y0 : hand.y0 - y0 + height, hand.x0 - x0 : hand.x0 - x0 + width] = hand.mask
-    behind, hidden = _of_window(room, x0, y0, x1, y1), _of_window(covered, x0, y0, x1, y1)
-    of_hand, of_room = _told_apart(picture[y0:y1, x0:x1].astype(np.float32), behind.astype(np.float32), mask, reach)
-    known = (hidden == 0) & _beyond(hand, x0, y0, mask.shape)
-    left = np.asarray(mask & ~(of_room & known), np.uint8)
-    if np.count_nonzero(left) < (1 - MOST_TAKEN) * hand.area:
-        left = mask
-    whole = _connected(left, np.asarray(of_hand & known, np.uint8))
+    seen, behind = picture[y0:y1, x0:x1], _of_window(room, x0, y0, x1, y1)
+    known = (_of_window(covered, x0, y0, x1, y1) == 0) & _beyond(hand, x0, y0, mask.shape)
+    differs = _squares(np.asarray(cv2.subtract(seen, behind, dtype=cv2.CV_32F), np.float32)) > LEAST_CONTRAST**2
+    colours = _Colours(seen, behind, mask, reach)
+    doubtful = np.flatnonzero(known & differs & (mask == 0))
+    more = np.zeros_like(mask)
+    more.ravel()[doubtful[colours.are_of_hand(doubtful)]] = 1
+    bare = np.flatnonzero(known & ~differs & (mask != 0))
+    less = bare[colours.are_clearly_room(bare)]
+    left = mask
+    if len(less) <= MOST_TAKEN * hand.area:
+        left = mask.copy()
+        left.ravel()[less] = 0
+    whole = _connected(left, more)
     return hand._replace(mask=whole, x0=x0, y0=y0, area=int(np.count_nonzero(whole)))
 
 
-def _told_apart(seen: Colours, room: Colours, mask: Mask, reach: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Where the picture is a mix of the hand's colour nearby, lit more or less, and of the room, more of the hand; and where
-    it is the room alone, of which the hand's colour is clearly another.
-    """
-    side = (2 * reach + 1, 2 * reach + 1)
-    near = cv2.blur(mask.astype(np.float32), side, borderType=cv2.BORDER_CONSTANT)
-    hand = cv2.blur(seen * mask[..., None], side, borderType=cv2.BORDER_CONSTANT) / np.maximum(near, 1e-6)[..., None]
-    # Least squares: seen = lit * hand + bare * room, both of three channels.
-    hh, rr, hr = _products(hand, hand), _products(room, room), _products(hand, room)
-    hs, rs = _products(hand, seen), _products(room, seen)
-    free = np.maximum(hh * rr - hr**2, 1.0)
-    lit, bare = (hs * rr - rs * hr) / free, (rs * hh - hs * hr) / free
-    rest = seen - lit[..., None] * hand - bare[..., None] * room
-    share = 1 - bare
-    light = lit / np.maximum(share, 0.1)
-    explained = (near > 1e-6) & (_products(rest, rest) < NOISE**2)
-    changed = _products(seen - room, seen - room) > LEAST_CONTRAST**2
-    of_hand = explained & changed & (share > LEAST_SHARE) & (light > DARKEST) & (light < BRIGHTEST)
-    return of_hand, ~changed & (_products(hand - room, hand - room) > CLEARLY**2)
+class _Colours:
+    """The colours in a window: what is seen, the room behind it, and that of the hand nearby."""
+
+    def __init__(self, seen: Image, room: Image, mask: Mask, reach: int) -> None:
+        self._seen, self._room = seen.reshape(-1, 3), room.reshape(-1, 3)
+        self._width = mask.shape[1]
+        # The hand's colour nearby changes slowly: at half the resolution it costs a quarter.
+        half = np.ascontiguousarray(mask[::2, ::2]).astype(np.float32)
+        side = (reach | 1, reach | 1)
+        self._near = cv2.blur(half, side, borderType=cv2.BORDER_CONSTANT)
+        self._hand = cv2.blur(seen[::2, ::2] * half[..., None], side, borderType=cv2.BORDER_CONSTANT)
+
+    def are_of_hand(self, pixels: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Which of these are a mix of the hand's colour nearby, lit more or less, and of the room, more of the hand."""
+        seen, room, hand = (*self._known(pixels), self._hand_near(pixels))
+        # Least squares: seen = lit * hand + bare * room, all of three channels.
+        hh, rr, hr = _squares(hand), _squares(room), _products(hand, room)
+        hs, rs = _products(hand, seen), _products(room, seen)
+        free = np.maximum(hh * rr - hr**2, 1.0)
+        lit, bare = (hs * rr - rs * hr) / free, (rs * hh - hs * hr) / free
+        rest = seen - lit[:, None] * hand - bare[:, None] * room
+        share = 1 - bare
+        light = lit / np.maximum(share, 0.1)
+        explained = (hh > 0) & (_squares(rest) < NOISE**2)
+        return np.asarray(explained & (share > LEAST_SHARE) & (light > DARKEST) & (light < BRIGHTEST), np.bool_)
+
+    def are_clearly_room(self, pixels: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Of which of these, where the room is seen, the hand's colour is clearly another."""
+        _, room = self._known(pixels)
+        return np.asarray(_squares(self._hand_near(pixels) - room) > CLEARLY**2, np.bool_)
+
+    def _known(self, pixels: NDArray[np.intp]) -> tuple[Colours, Colours]:
+        return self._seen[pixels].astype(np.float32), self._room[pixels].astype(np.float32)
+
+    def _hand_near(self, pixels: NDArray[np.intp]) -> Colours:
+        """(n, 3), 0 where the hand is too far away."""
+        rows, columns = np.divmod(pixels, self._width)
+        at = rows // 2, columns // 2
+        return np.asarray(self._hand[at] / np.maximum(self._near[at], 1e-6)[:, None])
+
+
+def _squares(one: Colours) -> Colours:
+    return _products(one, one)
 
 
 def _products(one: Colours, other: Colours) -> Colours:
-    return np.asarray(np.einsum("ijc,ijc->ij", one, other))
+    """Sum over the channels, the last axis."""
+    return np.asarray(one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1] + one[..., 2] * other[..., 2])
 
 
 def _beyond(hand: Hand, x0: int, y0: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -24,6 +24,7 @@ from deixis_tracker.hypotheses import Points
 from deixis_tracker.kalman import PointFilter
 
 MOST_HANDS = 4
+HANGING = 3.4  # head widths below the head: lower a hand is at rest (the gesture stage reads outlines down to 3.6 face widths)
 
 # Chin and brow, in head widths from the head's centre: they lie a little below the middle of the head.
 FACE_ABOVE, FACE_BELOW = 0.52, 0.66
@@ -129,6 +130,10 @@ class Person:
             and math.hypot(hand.motion.x - x, hand.motion.y - y) < QUICK_NEAR * self.width
             for hand in self.hands
         )
+
+    def hangs(self, hand: HandTrack) -> bool:
+        """Whether a hand is so low that it is held out nowhere."""
+        return hand.motion.y > self.y + HANGING * self.width
 
     def shoulder(self, x: float) -> tuple[float, float]:
         """The shoulder on the side of the picture where `x` is."""

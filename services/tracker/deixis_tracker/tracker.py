@@ -116,8 +116,8 @@ class Tracker:
             self._skin.adapt_room(views.coarse, room)
 
     def _find_fingers(self, persons: list[Person], views: Views) -> None:
-        """What colour missed of the hands that are seen."""
-        hands = [(person, hand) for person in persons for hand in person.hands if hand.blob is not None]
+        """What colour missed of the hands that are seen, where their fingers matter: not of arms that hang."""
+        hands = [(person, hand) for person in persons for hand in person.hands if hand.blob and not person.hangs(hand)]
         if not hands:
             return
         size = (views.coarse.shape[0], views.coarse.shape[1])
