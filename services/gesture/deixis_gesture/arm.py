@@ -101,7 +101,8 @@ class Arm:
         self._first_s = time_s if self._first_s is None else self._first_s
         self._weigh_side(track, frame_s)
         hand = self._shape(track, face)
-        place = hand.centroid if hand else _about(face, track.centroid_px)
+        # Not of the outline, whose fingers come and go: a hand that was held still seemed to move.
+        place = _about(face, track.centroid_px)
         self.stretch = math.dist(place, CHEST)
         phase = self._phases.update(time_s, self._gone_to(face, place, room), place, walking)
         self.fingers = find_fingers(hand) if hand and phase != "idle" else []
