@@ -1,6 +1,6 @@
 """Chooses how exactly arms are seen, and how often not at all: constants of `deixis_gesture/bearing.py` (`TRIED`).
 
-usage: python fitting/choose_bearing.py [--seeds A:B] [--kinds KINDS]
+usage: python fitting/choose_bearing.py [--seeds A:B] [--kind KIND]
 
 Tracker and gesture stage play the clips of these seeds (default: those of 0:20 with one person who points); for each value of
 each constant, the others as they stand, it is said how likely it makes the true bearings of the pointings that are recognised
@@ -41,21 +41,18 @@ def main() -> int:
     """Play, try, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", default="0:20")
-    parser.add_argument("--kinds", default="point", help="of the simulator's clips (default: point)")
+    parser.add_argument("--kind", default="point", help="of the simulator's clips (default: point)")
     given = parser.parse_args()
-    clips = choose(Choice(None, given.seeds, kinds=given.kinds), Console(stderr=True)).clips
+    clips = choose(Choice(None, given.seeds, kinds=(given.kind,)), Console(stderr=True)).clips
     strokes = [stroke for clip in clips for stroke in asked_in(clip)]
     for name, values in TRIED.items():
         stands = getattr(bearing, name)
         for value in values:
             setattr(bearing, name, value)
             told, off = zip(*(_read(true_deg, asked) for true_deg, asked in strokes), strict=True)
-            print(
-                f"{name} {value:g}: {-np.mean(told):.3f} nats, {np.median(off):.0f} degrees off (median)",
-                len(strokes),
-                "strokes",
-            )
+            print(f"{name} {value:g}: {-np.mean(told):.3f} nats, {np.median(off):.0f} degrees off (median)")
         setattr(bearing, name, stands)
+    print(f"{len(strokes)} strokes")
     return 0
 
 

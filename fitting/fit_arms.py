@@ -5,7 +5,7 @@ usage: python fitting/fit_arms.py [--arms N] [--out FILE] [--check]
 The simulator lets N people of its fitting avatars point all around (`deixis_simulation.pointing_arms`): where their fingertips
 are is what the stage compares a fingertip with. No picture is rendered. It takes about ten minutes on two cores. With --check
 nothing is written: a thousand arms of the people who were held out are read by the file that is there, with tips and distances
-that are measured badly, and it is said how far off and how sure bearings are: `bearing.py` has NO_ARM and its sigmas by that.
+that are measured badly, and it is said how far off and how sure bearings are: `bearing.py` has NO_ARM by that.
 """
 
 from __future__ import annotations

@@ -76,8 +76,11 @@ class Arm:
         if not self._measures:
             return None
         sights = [sight for _, sight in self._measures]
-        tip, fist = (_middle([getattr(sight, name) for sight in sights]) for name in ("tip", "fist"))
-        return HandSight(tip, fist, statistics.median(sight.radius for sight in sights))
+        return HandSight(
+            _middle([sight.tip for sight in sights]),
+            _middle([sight.fist for sight in sights]),
+            statistics.median(sight.radius for sight in sights),
+        )
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""
@@ -104,7 +107,7 @@ class Arm:
         # Not of the outline, whose fingers come and go: a hand that was held still seemed to move.
         place = _about(face, track.centroid_px)
         self.stretch = math.dist(place, CHEST)
-        phase = self._phases.update(time_s, self._gone_to(face, place, room), place, walking)
+        phase = self._phases.update(time_s, self._gone_to(track.centroid_px, face.width_px, room), place, walking)
         self.fingers = find_fingers(hand) if hand and phase != "idle" else []
         if phase != "stroke":
             self._stroke, self._verdict = self._new_stroke(), Verdict()
@@ -113,20 +116,19 @@ class Arm:
             self._verdict = self._stroke.add(self._look(hand, time_s, fellow))
             self._measure(hand, time_s)
 
-    def _gone_to(self, face: Face, place: Point, room: Point) -> Point:
-        """Where the hand is in the room, face widths from where it was seen first.
+    def _gone_to(self, at_px: Point, face_width_px: float, room: Point) -> Point:
+        """Where a hand at this place of the picture is in the room, face widths from where it was seen first.
 
         Summed step by step: the face's width breathes, and a hand 600 pixels from the picture's corner seemed to move by half
         a face width a second, measured from there: it was never at rest, so that nothing was known of where it came from.
         """
-        x, y = face.pixels(place)
         if self._last is not None:
             (last_x, last_y), (room_x, room_y) = self._last
             self._gone = (
-                self._gone[0] + (x - last_x) / face.width_px - (room[0] - room_x),
-                self._gone[1] + (y - last_y) / face.width_px - (room[1] - room_y),
+                self._gone[0] + (at_px[0] - last_x) / face_width_px - (room[0] - room_x),
+                self._gone[1] + (at_px[1] - last_y) / face_width_px - (room[1] - room_y),
             )
-        self._last = (x, y), room
+        self._last = at_px, room
         return self._gone
 
     def _new_stroke(self) -> StrokeRules:

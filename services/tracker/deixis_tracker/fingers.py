@@ -33,7 +33,7 @@ def with_fingers(hand: Hand, picture: Image, room: Image, covered: Mask, head_wi
     """The hand with what of it lies beyond its outline, and without what of the room lies within, on the side of its tip.
 
     picture: (H, W, 3) at working resolution. room: (h, w, 3) at the coarse one, as it would look now. covered: (h, w), not 0
-    where the room is not known or something else of the person is.
+    where the room is not known or something else of the person is. Its centroid stays: what is added comes and goes.
     """
     reach = max(2, round(REACH * head_width_px))
     height, width = hand.mask.shape

@@ -117,14 +117,12 @@ class Tracker:
 
     def _find_fingers(self, persons: list[Person], views: Views) -> None:
         """What colour missed of the hands that are seen, where their fingers matter: not of arms that hang."""
-        hands = [(person, hand) for person in persons for hand in person.hands if hand.blob and not person.hangs(hand)]
-        if not hands:
-            return
         size = (views.coarse.shape[0], views.coarse.shape[1])
         covered = np.asarray(cv2.bitwise_or(self._room.unknown, head_zone(size, persons, 0.0)), np.uint8)
-        for person, hand in hands:
-            if hand.blob is not None:
-                hand.blob = with_fingers(hand.blob, views.full, self._room.room, covered, person.width)
+        for person in persons:
+            for hand in person.hands:
+                if hand.blob is not None and not person.hangs(hand):
+                    hand.blob = with_fingers(hand.blob, views.full, self._room.room, covered, person.width)
 
     def _follow_camera(self, coarse: Image, step: Step) -> None:
         """Move what is known with the room, where the camera moved."""
