@@ -5,7 +5,7 @@ usage: python fitting/fit_arms.py [--arms N] [--out FILE] [--check]
 The simulator lets N people of its fitting avatars point all around (`deixis_simulation.pointing_arms`): where their fingertips
 are is what the stage compares a fingertip with. No picture is rendered. It takes about ten minutes on two cores. With --check
 nothing is written: a thousand arms of the people who were held out are read by the file that is there, with tips and distances
-that are measured badly, and it is said how far off and how sure bearings are: `bearing.py` has NO_ARM by that.
+that are measured badly, and it is said how far off and how sure bearings and elevations are: `bearing.py` has NO_ARM by that.
 """
 
 from __future__ import annotations
@@ -45,33 +45,43 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="read arms of held-out people, and write nothing")
     given = parser.parse_args()
     if given.check:
-        check(*drawn([(seed, False) for seed in CHECKED_SEEDS]))
+        check(drawn([(seed, False) for seed in CHECKED_SEEDS]))
         return 0
-    bearings, left, tips, fists = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
-    bearings, tips, fists = (values.astype(np.float16) for values in (bearings, tips, fists))
-    np.savez_compressed(given.out, bearings_deg=bearings, left=left, tips=tips, fists=fists)
+    arms = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
+    packed = {name: values if name == "left" else values.astype(np.float16) for name, values in arms.items()}
+    np.savez_compressed(given.out, **packed)
     return 0
 
 
-def drawn(parts: list[tuple[int, bool]]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Bearings (n,) in degrees, whether it is the left arm (n,), tips and fists (n, 3) of these seeds' arms."""
+def drawn(parts: list[tuple[int, bool]]) -> dict[str, np.ndarray]:
+    """Of these seeds' arms: bearings_deg and elevations_deg (n,), left (n,), whether it is that arm, tips and fists (n, 3)."""
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        bearings, left, tips, fists = zip(*pool.map(_part, parts), strict=True)
-    return np.concatenate(bearings), np.concatenate(left), np.concatenate(tips), np.concatenate(fists)
+        made = list(pool.map(_part, parts))
+    return {name: np.concatenate([part[name] for part in made]) for name in made[0]}
 
 
-def check(bearings: np.ndarray, left: np.ndarray, tips: np.ndarray, fists: np.ndarray) -> None:
+def check(arms: dict[str, np.ndarray]) -> None:
     """Say how well these arms are read."""
-    rng, errors, inside = np.random.default_rng(0), [], []
-    for bearing, is_left, tip, fist in zip(bearings, left, tips, fists, strict=True):
+    rng, errors, inside, high = np.random.default_rng(0), [], [], []
+    for bearing, is_left, tip, fist, elevation in zip(
+        *(arms[name] for name in ("bearings_deg", "left", "tips", "fists", "elevations_deg")), strict=True
+    ):
         missed = rng.normal(0, MISSED, 3) * (1, 1, 0)
-        told = np.array(_read(bearing, is_left, (tip + missed, fist + missed), rng).likelihood)
+        answer = _read(bearing, is_left, (tip + missed, fist + missed), rng)
+        if answer.elevation_deg is not None and answer.elevation_sigma_deg is not None:
+            high.append((answer.elevation_deg - elevation, answer.elevation_sigma_deg, elevation))
+        told = np.array(answer.likelihood)
         order = np.argsort(-told)
         place = int(np.nonzero(order == int(np.argmin(np.abs(_wrapped(BEARINGS - bearing)))))[0][0])
         inside.append(float(told[order][:place].sum() / told.sum()))
         errors.append(abs(_wrapped(BEARINGS[order[0]] - bearing)))
     print(f"{len(errors)} arms: the likeliest bearing is off by {np.median(errors):.1f} deg (median); the likeliest", end=" ")
     print(", ".join(f"{level:.0%} hold {np.mean(np.array(inside) < level):.0%}" for level in (0.68, 0.95)))
+    off, sigmas, true = np.array(high).T
+    within = [np.mean(np.abs(off) < width * sigmas) for width in (1.0, 1.96)]
+    apart = np.median(np.abs(true - np.median(true)))
+    print(f"elevation: off by {np.median(np.abs(off)):.1f} deg (median; true ones are {apart:.1f} from theirs);", end=" ")
+    print(f"within 1 and 1.96 sigma {within[0]:.0%}, {within[1]:.0%}; mean sigma {sigmas.mean():.1f} deg")
 
 
 def _read(bearing: float, is_left: bool, places: tuple[np.ndarray, np.ndarray], rng: np.random.Generator) -> Bearing:
@@ -96,19 +106,20 @@ def _wrapped(degrees: np.ndarray) -> np.ndarray:
     return (degrees + 180) % 360 - 180
 
 
-def _part(job: tuple[int, bool]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _part(job: tuple[int, bool]) -> dict[str, np.ndarray]:
     from deixis_simulation.avatars import FITTING_AVATARS, HELD_OUT_AVATARS  # noqa: PLC0415 (in the process that draws)
     from deixis_simulation.pointing_arms import pointing_arms  # noqa: PLC0415
 
     seed, fitting = job
     arms = list(pointing_arms(seed, FITTING_AVATARS if fitting else HELD_OUT_AVATARS, PART))
     print(f"{PART} arms of seed {seed}", flush=True)
-    return (
-        np.array([arm.bearing_deg for arm in arms]),
-        np.array([arm.side == "left" for arm in arms]),
-        np.array([arm.tip for arm in arms]),
-        np.array([arm.fist for arm in arms]),
-    )
+    return {
+        "bearings_deg": np.array([arm.bearing_deg for arm in arms]),
+        "elevations_deg": np.array([arm.elevation_deg for arm in arms]),
+        "left": np.array([arm.side == "left" for arm in arms]),
+        "tips": np.array([arm.tip for arm in arms]),
+        "fists": np.array([arm.fist for arm in arms]),
+    }
 
 
 if __name__ == "__main__":

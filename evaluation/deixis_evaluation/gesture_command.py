@@ -100,6 +100,9 @@ def summary_of(scores: Sequence[GestureScore]) -> Table:
     table.add_row("side right", _share(summary.side))
     table.add_row("bearing off (median)", number(summary.bearing_off_deg, "°"))
     table.add_row("true bearing within 68 % / 95 %", f"{_share(summary.within_68)}, {_share(summary.within_95)}")
+    table.add_row("elevation off (median)", number(summary.elevation_off_deg, "°"))
+    within = f"{_share(summary.elevation_within_1)}, {_share(summary.elevation_within_2)}"
+    table.add_row("true elevation within 1 / 1.96 sigma", within)
     table.add_row(
         "onset / end, after the true ones (median)", f"{number(summary.onset_s, ' s', 2)}, {number(summary.end_s, ' s', 2)}"
     )

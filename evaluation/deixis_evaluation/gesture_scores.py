@@ -15,6 +15,7 @@ from .angle_scores import signed_error_deg
 from .clips import SideName, Truth
 from .episode_scores import Stroke, strokes_of
 from .recording import Recording
+from .true_elevation import elevation_of
 
 POINTING = ("point_left", "point_right", "invisible")
 LEAST_SHARE = 0.2
@@ -30,7 +31,8 @@ Said = Literal["point_left", "point_right", "invisible", "missed"]
 DEFINITION = (
     f"recognised: a pointing (either side, or invisible) is said of the person in {LEAST_SHARE:.0%} of the stroke's frames. "
     "Side: of strokes at 30 to 150 degrees that are recognised with a side. Bearing: off by, and how often the true one is "
-    "among the likeliest that hold 68 and 95 %. Onset, end: first and last frame in a stroke, after the true one. False: "
+    "among the likeliest that hold 68 and 95 %. Elevation: off by, at the head, and how often within 1 and 1.96 sigma. "
+    "Onset, end: first and last frame in a stroke, after the true one. False: "
     f"pointings said more than {AROUND_S:g} s away from every true stroke of the person; by the minute where nobody points."
 )
 
@@ -39,7 +41,8 @@ DEFINITION = (
 class StrokeScore:
     """One true stroke. azimuth_deg: of the POI; side: to which it lies, none in front and behind. bearing_off_deg: of the
     likeliest bearing, signed; level: share of the likelihood in what is likelier than the true one. onset_s, end_s: after the
-    true ones. probability: median of the stated one. None where it was not said.
+    true ones. probability: median of the stated one. elevation_off_deg: signed, elevation_sigma_deg: as stated, medians. None
+    where it was not said.
     """
 
     clip: str
@@ -54,6 +57,8 @@ class StrokeScore:
     onset_s: float | None = None
     end_s: float | None = None
     probability: float | None = None
+    elevation_off_deg: float | None = None
+    elevation_sigma_deg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,10 @@ def _score(name: str, stroke: Stroke, truth: Truth, recording: Recording, person
     off, level = _bearing(pointing, azimuth)
     told = [gesture.point_probability for gesture in pointing if gesture.point_probability is not None]
     probability = median(told) if told else None
-    return StrokeScore(name, stroke.person_id, azimuth, arm, stroke.side, frames, kind, off, level, onset_s, end_s, probability)
+    high = _elevation(pointing, elevation_of(stroke, truth))
+    return StrokeScore(
+        name, stroke.person_id, azimuth, arm, stroke.side, frames, kind, off, level, onset_s, end_s, probability, *high
+    )
 
 
 def _end_s(stroke: Stroke, truth: Truth, recording: Recording, own: set[int]) -> float:
@@ -140,6 +148,15 @@ def _bearing(pointing: Sequence[Gesture], true_deg: float) -> tuple[float | None
     likelier = order[: int(np.nonzero(order == near)[0][0])]
     level = float(curve[likelier].sum() / curve.sum())
     return signed_error_deg(float(bearings[order[0]]), true_deg), level
+
+
+def _elevation(pointing: Sequence[Gesture], true_deg: float | None) -> tuple[float | None, float | None]:
+    told = [gesture.elevation_deg for gesture in pointing if gesture.elevation_deg is not None]
+    if not told or true_deg is None:
+        return None, None
+    return median(told) - true_deg, median(
+        gesture.elevation_sigma_deg or 0.0 for gesture in pointing if gesture.elevation_sigma_deg
+    )
 
 
 def _false_pointings(

@@ -13,8 +13,9 @@ from .proportion import Proportion
 
 @dataclass(frozen=True)
 class GestureSummary:
-    """recognised, side: of the strokes; within_68, within_95: how often the true bearing is in these regions. Medians: none
-    where there was nothing. false_per_quiet_minute: of clips in which nobody points.
+    """recognised, side: of the strokes; within_68, within_95: how often the true bearing is in these regions, and
+    elevation_within_1, elevation_within_2: the true elevation within 1 and 1.96 sigma. Medians: none where there was nothing.
+    false_per_quiet_minute: of clips in which nobody points.
     """
 
     strokes: int
@@ -23,6 +24,9 @@ class GestureSummary:
     bearing_off_deg: float | None
     within_68: Proportion
     within_95: Proportion
+    elevation_off_deg: float | None
+    elevation_within_1: Proportion
+    elevation_within_2: Proportion
     onset_s: float | None
     end_s: float | None
     false: int
@@ -41,6 +45,11 @@ def summarise_gestures(scores: Sequence[GestureScore]) -> GestureSummary:
     strokes = [stroke for score in played for stroke in score.strokes]
     found = [stroke for stroke in strokes if stroke.said != "missed"]
     levels = [stroke.level for stroke in found if stroke.level is not None]
+    high = [
+        (abs(stroke.elevation_off_deg), stroke.elevation_sigma_deg)
+        for stroke in found
+        if stroke.elevation_off_deg is not None and stroke.elevation_sigma_deg is not None
+    ]
     quiet = [score for score in played if score.is_quiet]
     return GestureSummary(
         strokes=len(strokes),
@@ -51,6 +60,9 @@ def summarise_gestures(scores: Sequence[GestureScore]) -> GestureSummary:
         bearing_off_deg=_median([abs(stroke.bearing_off_deg) for stroke in found if stroke.bearing_off_deg is not None]),
         within_68=Proportion.of(level < 0.68 for level in levels),
         within_95=Proportion.of(level < 0.95 for level in levels),
+        elevation_off_deg=_median([off for off, _ in high]),
+        elevation_within_1=Proportion.of(off <= sigma for off, sigma in high),
+        elevation_within_2=Proportion.of(off <= 1.96 * sigma for off, sigma in high),
         onset_s=_median([stroke.onset_s for stroke in strokes if stroke.onset_s is not None]),
         end_s=_median([stroke.end_s for stroke in strokes if stroke.end_s is not None]),
         false=sum(len(score.false) for score in played),
@@ -69,6 +81,9 @@ def figures(scores: Sequence[GestureScore]) -> dict[str, Any]:
         "bearing_off_deg": summary.bearing_off_deg,
         "bearing_within_68": _share(summary.within_68),
         "bearing_within_95": _share(summary.within_95),
+        "elevation_off_deg": summary.elevation_off_deg,
+        "elevation_within_1_sigma": _share(summary.elevation_within_1),
+        "elevation_within_1.96_sigma": _share(summary.elevation_within_2),
         "onset_s": summary.onset_s,
         "end_s": summary.end_s,
         "false": summary.false,
@@ -86,6 +101,8 @@ def stroke_figures(stroke: StrokeScore) -> dict[str, Any]:
         "frames": stroke.frames,
         "said": stroke.said,
         "bearing_off_deg": stroke.bearing_off_deg,
+        "elevation_off_deg": stroke.elevation_off_deg,
+        "elevation_sigma_deg": stroke.elevation_sigma_deg,
         "onset_s": stroke.onset_s,
         "end_s": stroke.end_s,
         "probability": stroke.probability,

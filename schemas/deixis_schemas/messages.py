@@ -324,6 +324,10 @@ class Gesture(Part):
         description="How likely what is seen is if the person points to bearing -180, -175 ... 175 degrees, beside the best; "
         "empty, or all of them. It says more than mean and sigma do: front and back, and what no arm does.",
     )
+    elevation_deg: Annotated[float, Field(ge=-90, le=90)] | None = Field(
+        default=None, description="How high it points, above the horizontal at the person's head, where the stage can tell."
+    )
+    elevation_sigma_deg: Annotated[float, Field(gt=0, le=180)] | None = None
     point_probability: Share | None = Field(
         default=None, description="That this stroke is a pointing; none outside of strokes, and of a stage that does not weigh."
     )
@@ -337,6 +341,12 @@ class Gesture(Part):
             raise ValueError("bearing_sigma_deg: bearing_deg and bearing_sigma_deg come together")
         if self.bearing_likelihood and (len(self.bearing_likelihood) != BEARINGS or max(self.bearing_likelihood) <= 0):
             raise ValueError(f"bearing_likelihood: {BEARINGS} shares, one at least above 0")
+        return self
+
+    @model_validator(mode="after")
+    def _elevation_has_sigma(self) -> Self:
+        if (self.elevation_deg is None) != (self.elevation_sigma_deg is None):
+            raise ValueError("elevation_sigma_deg: elevation_deg and elevation_sigma_deg come together")
         return self
 
 

@@ -153,6 +153,8 @@ SAMPLES: tuple[m.Message, ...] = (
                 bearing_deg=62.0,
                 bearing_sigma_deg=15.0,
                 bearing_mirrored=True,
+                elevation_deg=-12.5,
+                elevation_sigma_deg=14.0,
                 point_probability=0.93,
                 point_log_odds={"posture": 2.1, "way": 0.5},
             )

@@ -1,5 +1,7 @@
 """Scores of the gesture stage: strokes found and missed, false pointings, and table 1 as measured."""
 
+import math
+
 import pytest
 from deixis_cli.options import CommandError
 from deixis_evaluation.clips import Truth
@@ -15,7 +17,7 @@ STROKE = range(20, 50)
 HAND = {"center_px": (200.0, 200.0), "visible_px": 300, "in_frame": True, "centroid_visible_px": (200.0, 200.0)}
 
 
-def _truth(azimuth=60.0, frames=90, stroke=STROKE):
+def _truth(azimuth=60.0, frames=90, stroke=STROKE, head_m=None):
     return Truth.model_validate(
         {
             "meta": {
@@ -24,16 +26,16 @@ def _truth(azimuth=60.0, frames=90, stroke=STROKE):
                            "K": ((560, 0, 320), (0, 560, 240), (0, 0, 1))},
                 "pois": [{"id": "P1", "xyz_world": (1, 1, 1)}],
             },
-            "frames": [{"frame": i, "persons": [_person(azimuth, i in stroke)]} for i in range(frames)],
+            "frames": [{"frame": i, "persons": [_person(azimuth, i in stroke, head_m)]} for i in range(frames)],
         }
     )  # fmt: skip
 
 
-def _person(azimuth, points):
+def _person(azimuth, points, head_m):
     return {
         "id": 0, "phase": "stroke" if points else "none", "gesture": "point" if points else "none",
         "poi": "P1" if points else None, "poi_azimuth_deg": azimuth if points else None,
-        "head": {"yaw_rel_deg": 0.0, "center_px": (320.0, 100.0)}, "face": {"visible_px": 900},
+        "head": {"yaw_rel_deg": 0.0, "center_px": (320.0, 100.0), "center_cam": head_m}, "face": {"visible_px": 900},
         "hands": {"left": HAND, "right": HAND}, "arm": {"side": "left"} if points else {},
         "user_pos": {"robot_xy": (2.0, 0.0), "distance_m": 2.0},
     }  # fmt: skip
@@ -45,15 +47,25 @@ def _curve(bearing):
     return values
 
 
-def _said(frames, gesture="point_left", bearing=60.0, phase="stroke"):
+def _said(frames, gesture="point_left", bearing=60.0, phase="stroke", **more):
     """A recording in which this is said in these frames of the person tracked as 7."""
     recording = Recording()
     for frame in frames:
-        told = {"bearing_deg": bearing, "bearing_sigma_deg": 9.0, "bearing_likelihood": _curve(bearing)}
+        told = {"bearing_deg": bearing, "bearing_sigma_deg": 9.0, "bearing_likelihood": _curve(bearing), **more}
         one = Gesture(person_id=7, phase=phase, gesture=gesture, **(told if gesture != "other" else {}))
         of = {"run": 1, "seq": frame, "stamp_ns": frame, "stage": "gesture", "instance": "g"}
         recording.add(Gestures(**of, gestures=[one]), frame)
     return recording
+
+
+def test_an_elevation_is_off_from_that_of_the_poi_at_the_head():
+    """The POI is at (1, 1, 1); a head 2 m before the camera and level with it has it 1 m up and sqrt(1 + 9) m away."""
+    said = _said(range(23, 52), elevation_deg=20.0, elevation_sigma_deg=9.0)
+    (stroke,) = _scored(said, head_m=(0.0, 0.0, 2.0)).strokes
+    assert stroke.elevation_off_deg == pytest.approx(20.0 - math.degrees(math.atan2(1, math.sqrt(10))))
+    assert stroke.elevation_sigma_deg == 9.0
+    assert _scored(said).strokes[0].elevation_off_deg is None
+    assert summarise_gestures([_scored(said, head_m=(0.0, 0.0, 2.0))]).elevation_within_1.share == 1.0
 
 
 def _scored(recording, **truth):

@@ -1,4 +1,4 @@
-"""How high the head looks: which of two shelves, one above the other."""
+"""How high hand and head go: which of two shelves, one above the other."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from deixis_fusion.decision import Judgement
 from deixis_fusion.deixis_rules import DeixisRules
 from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Sample, Witness
 from deixis_fusion.frames import Frames
+from deixis_fusion.hand_evidence import hand_over
 from deixis_fusion.head_evidence import head_over
-from deixis_fusion.height import elevation_of_head, likelihoods
+from deixis_fusion.height import elevation_of_head, head_likelihoods
 from deixis_fusion.localisation import PersonPlace
 from deixis_fusion.sight import Lookout, Points
 from deixis_fusion.visibility import Walls
 from deixis_headpose.head import Pose, rotation_of
 from deixis_runtime.mount import to_base
-from deixis_schemas.messages import CameraMount, HeadPose, Poi
+from deixis_schemas.messages import CameraMount, Gesture, HeadPose, Poi
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -50,8 +51,12 @@ def shelf(*heights: float, aside: float = -1.5) -> list[Poi]:
 ASIDE = Poi(poi_id="aside", position_m=(0.5, 1.5, 1.6))
 
 
-def judge(pois: list[Poi], pitch: float | None, sigma: float | None, yaw: float = 90.0) -> Judgement:
-    hand = HandObservation("point_left", 90.0, 10.0)
+def judge(
+    pois: list[Poi], pitch: float | None, sigma: float | None, yaw: float = 90.0, raised: tuple[float, float] | None = None
+) -> Judgement:
+    """`raised`: elevation of the hand and its sigma."""
+    elevation, spread = raised or (None, None)
+    hand = HandObservation("point_left", 90.0, 10.0, elevation_deg=elevation, elevation_sigma_deg=spread)
     seen = Lookout(0.15).look(PLACE, Points.of(pois), Walls(()))
     head = HeadObservation(yaw, 4.0, pitch_deg=pitch, pitch_sigma_deg=sigma)
     rules = DeixisRules(CONFIG.hand, CONFIG.head, CONFIG.answer)
@@ -90,10 +95,34 @@ def test_pois_at_one_height_are_told_apart_as_before(pitch: float, sigma: float)
 def test_the_likelihood_is_1_where_it_fits_and_has_a_tail() -> None:
     points, extent = np.array([(2.0, -1.5, 1.6), (2.0, -1.5, -9.0)]), np.array([0.0, 0.0])
     level = HeadObservation(90.0, 3, pitch_deg=0.0, pitch_sigma_deg=3)
-    high = likelihoods(level, PLACE, points, extent, CONFIG.head)
+    high = head_likelihoods(level, PLACE, points, extent, CONFIG.head)
     assert high is not None
     assert high[0] == pytest.approx(1, abs=0.02)
     assert 0.15 < high[1] < 0.3
+
+
+@pytest.mark.parametrize(("elevation", "answer"), [(-38.0, "z0.3"), (6.0, "z1.8")])
+def test_a_hand_that_is_lowered_or_not_tells_two_shelves_apart(elevation: float, answer: str) -> None:
+    assert judge([*shelf(0.3, 1.8), ASIDE], None, None, raised=(elevation, 9.0)).poi_ids == (answer,)
+    assert len(judge([*shelf(0.3, 1.8), ASIDE], None, None, raised=(elevation, 60.0)).poi_ids) == 2
+
+
+@given(st.floats(-60, 60), st.floats(1, 60))
+def test_a_wrong_elevation_lets_nobody_abstain_nor_mean_what_is_elsewhere(elevation: float, sigma: float) -> None:
+    told = judge([*shelf(0.3, 1.8), ASIDE], None, None, raised=(elevation, sigma))
+    assert told.poi_ids
+    assert told.chances[2] < 0.1
+
+
+def test_over_a_stroke_the_elevation_is_the_median_of_the_frames_that_tell_it() -> None:
+    said = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 9.0}
+    frames = [said | {"elevation_deg": high, "elevation_sigma_deg": 8.0} for high in (-20.0, -20.0, -20.0, 50.0)]
+    samples = [Sample(i, i, Gesture.model_validate(frame), None) for i, frame in enumerate([*frames, said])]
+    told, silent = hand_over(Frames.of(samples)), hand_over(Frames.of(samples[-1:]))
+    assert told is not None
+    assert silent is not None
+    assert (told.elevation_deg, told.elevation_sigma_deg) == (-20.0, 8.0)
+    assert silent.elevation_deg is None
 
 
 def pose(pitch: float | None, variance: float | None) -> HeadPose:

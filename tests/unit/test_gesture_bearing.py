@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from deixis_gesture import bearing
-from deixis_gesture.bearing import BEARINGS, ArmSight, HandSight, Ray, arms_likelihood, estimate_bearing
+from deixis_gesture.bearing import BEARINGS, ArmSight, HandSight, Ray, estimate_bearing, fitting_arms, likelihood_of
 from deixis_gesture.hand import Face
 from deixis_gesture.person import HEAD_ABOVE_FACE, View
 from deixis_runtime.lens import Lens
@@ -28,6 +28,11 @@ def sight_of(tip, fist, distance=DISTANCE, height=0.0):
         return Ray(right / (distance - toward), (height + up) / math.hypot(distance - toward, right))
 
     return ArmSight(ray(tip), ray(fist), RADIUS, distance, height)
+
+
+def arms_likelihood(seen, side):
+    arms = bearing.load_arms(side)
+    return likelihood_of(fitting_arms(seen, arms), arms)
 
 
 def held_arms(count, seed=1):
@@ -73,6 +78,28 @@ def test_pointing_aside_is_told_from_pointing_ahead():
     assert abs(ahead.deg) < 35
 
 
+def test_an_arm_that_is_raised_points_higher():
+    """Aside, by the person's left arm: from the shoulder's height a face width up, and three down."""
+    low, level, high = (estimate_bearing(sight_of((3.8, up, 0.6), (3.2, up - 0.2, 0.5)), "left") for up in (-3.0, -1.0, 1.0))
+    assert low.elevation_deg + 15 < level.elevation_deg < high.elevation_deg - 10
+    for told in (low, level, high):
+        assert 3 < told.elevation_sigma_deg < 30
+
+
+def test_the_elevation_is_within_its_sigma_as_often_as_it_says():
+    """Of arms of the file, measured badly; each is left out of those that it is read by."""
+    arms, rng, off = bearing.load_arms("left"), np.random.default_rng(3), []
+    for k in rng.integers(len(arms.tips), size=300):
+        missed, distance = rng.normal(0, 0.2, 3) * (1, 1, 0), rng.uniform(7, 20)
+        found = fitting_arms(sight_of(arms.tips[k] + missed, arms.fists[k] + missed, distance), arms)
+        others = found.rows != k
+        rows, fits = found.rows[others], found.fits[others]
+        mean, spread = bearing._moments(arms.elevations[rows], fits)
+        off.append((arms.elevations[k] - mean) / max(bearing.LEAST_SIGMA_DEG, spread))
+    assert np.mean(np.abs(off) < 1) == pytest.approx(0.68, abs=0.12)
+    assert np.mean(np.abs(off) < 1.96) == pytest.approx(0.95, abs=0.06)
+
+
 def test_a_finger_that_shows_points_ahead_rather_than_behind():
     tip = (2.4, -1.1, 0.0)
     whole, short = (arms_likelihood(sight_of(tip, (2.4 - shown, -1.1, 0.0)), "left") for shown in (0.6, 0.3))
@@ -98,6 +125,7 @@ def test_a_constant_that_is_tried_counts(monkeypatch, name):
 def test_a_tip_where_no_arm_reaches_tells_nothing():
     nowhere = arms_likelihood(sight_of((9.0, 6.0, 0.0), (8.4, 5.8, 0.0)), "left")
     assert nowhere.min() == nowhere.max() == 1.0
+    assert estimate_bearing(sight_of((9.0, 6.0, 0.0), (8.4, 5.8, 0.0)), "left").elevation_deg is None
 
 
 def test_a_camera_that_is_tilted_and_rolled_sees_the_same_pointing():

@@ -20,7 +20,9 @@ POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible
 
 # What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
 # `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
-_OF_HAND = ("kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored", "has_curve")
+_OF_HAND = (
+    "kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored", "has_curve", "elevation_deg", "elevation_sigma_deg",
+)  # fmt: skip
 _OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
 _OF_PLACE = ("axis_deg", "x_m", "y_m")
 ROW = {name: i for i, name in enumerate(("at_ns", *_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
@@ -61,7 +63,8 @@ class Sample:
             return (NAN,) * len(_OF_HAND)
         kind, side = _place_in(POINTING, self.pointing), _place_in(SIDES, told.hand)
         bearing = _known(told.bearing_deg, told.bearing_sigma_deg)
-        return kind, side, *bearing, float(told.bearing_mirrored), 1.0 if told.bearing_likelihood else NAN
+        elevation = _known(told.elevation_deg, told.elevation_sigma_deg)
+        return kind, side, *bearing, float(told.bearing_mirrored), 1.0 if told.bearing_likelihood else NAN, *elevation
 
     def _of_head(self) -> tuple[float, ...]:
         told = self.pose
@@ -109,7 +112,8 @@ class HandObservation:
 
     `mirrored`: the bearing may as well be 180 - bearing, or `mirror` with its sigma, where both were seen from several sides.
     `agreement` is the share of the frames that said so. `likelihood` is that of bearings -180, -175 ... 175, where the stage
-    tells it: it then counts instead of bearing and sigma.
+    tells it: it then counts instead of bearing and sigma. `elevation_deg` is how high it points, above the horizontal at the
+    head, with its sigma.
     """
 
     gesture: PointingGesture
@@ -120,6 +124,8 @@ class HandObservation:
     hand: Side | None = None
     likelihood: tuple[float, ...] = ()
     mirror: tuple[float, float] | None = None
+    elevation_deg: float | None = None
+    elevation_sigma_deg: float | None = None
 
     def __hash__(self) -> int:
         # Kept curves are looked up by it, for each view in each frame: without the 72 values of the likelihood.

@@ -85,6 +85,8 @@ def _hand_witness(hand: HandObservation | None, stage: Witness, stamp_ns: int) -
     if hand.bearing_deg is not None and hand.bearing_sigma_deg is not None:
         mirror = f" or {hand.mirror_deg:.1f}" if hand.mirror_deg is not None else ""
         bearing = f", bearing {hand.bearing_deg:.1f}{mirror} +- {hand.bearing_sigma_deg:.1f} deg"
+    if hand.elevation_deg is not None and hand.elevation_sigma_deg is not None:
+        bearing += f", elevation {hand.elevation_deg:.1f} +- {hand.elevation_sigma_deg:.1f} deg"
     return Witness(stage.status, f"{hand.gesture}{bearing}", stage.producer, stamp_ns)
 
 

@@ -35,7 +35,7 @@ def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = 
     hand = None if side is None else SIDES[side]
     told = own & frames.tells("bearing_deg")
     if not told.any():
-        return HandObservation(gesture, agreement=agreement, hand=hand)
+        return HandObservation(gesture, agreement=agreement, hand=hand, **_elevation(frames, own))
     turns_of_all = frames.turns_to(axis_deg)
     weights, turns, seen = frames.weights[told], turns_of_all[told], frames.column("bearing_deg")[told]
     mirrored, mirror = bool(majority(frames.column("mirrored")[told], weights)), None
@@ -47,7 +47,19 @@ def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = 
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
     curve = _mean_curve(frames, told & frames.tells("has_curve"), turns_of_all) if with_curve else ()
-    return HandObservation(gesture, bearing, math.hypot(stated, spread), mirrored, agreement, hand, curve, mirror)
+    sigma, high = math.hypot(stated, spread), _elevation(frames, own)
+    return HandObservation(gesture, bearing, sigma, mirrored, agreement, hand, curve, mirror, **high)
+
+
+def _elevation(frames: Frames, own: Flags) -> dict[str, float]:
+    """How high these frames point together, by name, where any of them tells."""
+    told = own & frames.tells("elevation_deg")
+    if not told.any():
+        return {}
+    weights = frames.weights[told]
+    elevation, spread = median_angle(frames.column("elevation_deg")[told], weights)
+    stated = median(frames.column("elevation_sigma_deg")[told], weights)
+    return {"elevation_deg": elevation, "elevation_sigma_deg": math.hypot(stated, spread)}
 
 
 def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, ...]:

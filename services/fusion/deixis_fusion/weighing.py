@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ from .config import HandConfig, HeadConfig
 from .confusion import HandConfusion
 from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
-from .height import likelihoods
+from .height import hand_likelihoods, head_likelihoods
 from .localisation import PersonPlace
 from .sight import CASES, FEW_BELOW_DEG, FEW_CASES, Indices, Sight
 
@@ -70,7 +70,7 @@ class SourceCurves:
 
     def __init__(self, hand: HandConfig, head: HeadConfig, confusion: HandConfusion | None = None) -> None:
         """By the paper's table 1 or another."""
-        self.head_config = head
+        self.hand_config, self.head_config = hand, head
         self.of_hand: Callable[[HandObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_hand, hand, confusion))
         self.of_head: Callable[[HeadObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_head, head))
 
@@ -107,7 +107,7 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
     joint, most = by_name["joint"], by_name["most"]
     best = math.prod(stacked.max(axis=2).ravel().tolist())
     floor = math.prod(told["head"].min(axis=1).tolist()) if "head" in told else 1.0
-    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves.head_config)
+    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves)
 
 
 def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices, int]]:
@@ -126,19 +126,25 @@ def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices
             yield which[start : start + at_a_time], count
 
 
-def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, config: HeadConfig) -> Weighing:
-    """The same with how high the head looks, where that was measured and from one place (`height.py`).
+def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
+    """The same with how high hand and head go, where that was measured and from one place (`height.py`).
 
-    How well a POI fits is about directions: a pitch that is wrong makes no POI one that nobody can have meant.
+    How well a POI fits is about directions: a height that is wrong makes no POI one that nobody can have meant.
     """
-    if evidence.head is None or evidence.head.pitch_deg is None or evidence.views or seen.place is None:
+    hand, head = evidence.hand, evidence.head
+    by_hand = hand is not None and hand.elevation_deg is not None
+    by_head = head is not None and head.pitch_deg is not None
+    if not (by_hand or by_head) or evidence.views or seen.place is None:
         return weighed
     xyz, extent = seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen]
-    high = likelihoods(evidence.head, seen.place, xyz, extent, config)
-    if high is None:
-        return weighed
-    floor = weighed.head_floor * float(high.min())
-    return Weighing(weighed.hand, weighed.head * high, weighed.joint * high, weighed.fit, floor)
+    of_hand = hand_likelihoods(hand, seen.place, xyz, extent, curves.hand_config) if hand is not None else None
+    if of_hand is not None:
+        weighed = replace(weighed, hand=weighed.hand * of_hand, joint=weighed.joint * of_hand)
+    of_head = head_likelihoods(head, seen.place, xyz, extent, curves.head_config) if head is not None else None
+    if of_head is not None:
+        floor = weighed.head_floor * float(of_head.min())
+        weighed = replace(weighed, head=weighed.head * of_head, joint=weighed.joint * of_head, head_floor=floor)
+    return weighed
 
 
 def _part(told: Values, cases: Singles) -> Values:

@@ -6,13 +6,13 @@ fitting people in widths of their own faces, by `fitting/fit_arms.py`). Seen fro
 these arms puts its tip somewhere, and its finger beyond the fist; a bearing is as likely as its arms put theirs where both are
 seen. Front and back are told apart as far as perspective, the height of the tip, and the size of the fist tell them apart.
 The answer is the likelihood of bearings; its mean and standard deviation, plain or folded at 90 degrees (`mirrored`), are for
-whoever wants one number.
+whoever wants one number. The same arms tell how high the pointing goes (`elevation_deg`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -56,13 +56,16 @@ whose clips are not in the repository, they are worse (2.49, 2.61, 2.69).
 class Bearing:
     """Direction pointed to, degrees at the person, positive toward image right; `mirrored`: it may be 180 - b as well.
 
-    likelihood: of BEARINGS, its largest 1.
+    likelihood: of BEARINGS, its largest 1. elevation_deg: above the horizontal, at the head, with its standard deviation; none
+    where no arm fits.
     """
 
     deg: float
     sigma_deg: float
     mirrored: bool
     likelihood: tuple[float, ...] = ()
+    elevation_deg: float | None = None
+    elevation_sigma_deg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -100,19 +103,32 @@ class ArmSight:
     height: float
 
 
+@dataclass(frozen=True)
+class ArmFits:
+    """Arms that fit (n,): their rows, and how well each does."""
+
+    rows: NDArray[np.intp]
+    fits: Floats
+
+
 def estimate_bearing(seen: ArmSight, side: Side | None) -> Bearing:
     """Bearing of a pointing arm, the person's own `side` where that is known. Raises ValueError for no positive distance."""
     if not seen.distance > 0:
         raise ValueError(f"distance: {seen.distance} face widths, must be positive")
-    likelihood = arms_likelihood(seen, side)
-    expected = np.interp(np.abs(BEARINGS), SHAPE_BEARINGS, PALM_RADII)
-    likelihood = likelihood * _with_outliers(np.exp(-0.5 * ((seen.radius - expected) / PALM_SIGMA) ** 2))
-    return _described(likelihood / likelihood.max())
-
-
-def arms_likelihood(seen: ArmSight, side: Side | None) -> Floats:
-    """How likely each of BEARINGS puts fingertip and fist there, its largest 1."""
     arms = load_arms(side)
+    found = fitting_arms(seen, arms)
+    expected = np.interp(np.abs(BEARINGS), SHAPE_BEARINGS, PALM_RADII)
+    palm = _with_outliers(np.exp(-0.5 * ((seen.radius - expected) / PALM_SIGMA) ** 2))
+    likelihood = likelihood_of(found, arms) * palm
+    told = _described(likelihood / likelihood.max())
+    if found is None:
+        return told
+    elevation, spread = _moments(arms.elevations[found.rows], found.fits * (arms.share[found.rows] @ palm))
+    return replace(told, elevation_deg=elevation, elevation_sigma_deg=max(LEAST_SIGMA_DEG, spread))
+
+
+def fitting_arms(seen: ArmSight, arms: Arms) -> ArmFits | None:
+    """Which arms put fingertip and fist about there, and how well each; none where nobody's arm does."""
     tips = _seen_at(arms.tips, seen)
     off = tips[:, :2] - np.array([seen.tip.aside, seen.tip.slope], np.float32)
     off *= tips[:, 2:]
@@ -120,12 +136,18 @@ def arms_likelihood(seen: ArmSight, side: Side | None) -> Floats:
     log_fits = -0.5 * np.einsum("ij,ij->i", off, off) / variances - np.log(variances)
     most = float(log_fits.max())
     if most < LOG_NOBODY:
-        return np.ones(len(BEARINGS))  # nobody's arm: nothing is told
+        return None
     near = np.flatnonzero(log_fits > most - LOG_NEGLIGIBLE)
     ways = seen.distance * (tips[near] - _seen_at(arms.fists[near], seen))[:, :2]
     way = np.array([seen.tip.aside - seen.fist.aside, seen.tip.slope - seen.fist.slope])
-    fits = np.exp(log_fits[near]) * _with_outliers(_finger_fits(ways, seen.distance * way))
-    likelihood = fits @ arms.share[near]
+    return ArmFits(near, np.exp(log_fits[near] - most) * _with_outliers(_finger_fits(ways, seen.distance * way)))
+
+
+def likelihood_of(found: ArmFits | None, arms: Arms) -> Floats:
+    """How likely each of BEARINGS puts fingertip and fist there, its largest 1; all alike where no arm does."""
+    if found is None:
+        return np.ones(len(BEARINGS))
+    likelihood = found.fits @ arms.share[found.rows]
     return np.asarray((1 - NO_ARM) * likelihood / float(likelihood.max()) + NO_ARM)
 
 
@@ -150,13 +172,15 @@ def _finger_fits(expected: Floats, way: Floats) -> Floats:
 @dataclass(frozen=True)
 class Arms:
     """tips, fists (n, 3): right, up, toward the camera from the head; lengths (n,): of the way from there to the tip; share
-    (n, bearings): to which bearing an arm counts, each column's sum over both sides 1.
+    (n, bearings): to which bearing an arm counts, each column's sum over both sides 1; elevations (n,): how high it points,
+    degrees.
     """
 
     tips: Floats
     fists: Floats
     lengths: Floats
     share: Floats
+    elevations: Floats
 
 
 @cache
@@ -164,14 +188,16 @@ def load_arms(side: Side | None) -> Arms:
     """The arms of a side, and the mirror images of the other, for either hand does the same; of both where it is not known."""
     with files("deixis_gesture").joinpath("arms.npz").open("rb") as file:
         stored = np.load(file)
-        bearings, left = stored["bearings_deg"], stored["left"]
+        bearings, left, elevations = (stored[name] for name in ("bearings_deg", "left", "elevations_deg"))
         tips, fists = (np.concatenate([at, at * (-1, 1, 1)]).astype(np.float32) for at in (stored["tips"], stored["fists"]))
     bearings, left = np.concatenate([bearings, -bearings]).astype(np.float32), np.concatenate([left, ~left])
     off = (BEARINGS - bearings[:, None] + 180) % 360 - 180
     share = np.exp(-0.5 * (off / NEAR_DEG) ** 2)
     share = (share / share.sum(axis=0)).astype(np.float32)
     of_side = np.full(len(left), True) if side is None else left == (side == "left")
-    return Arms(tips[of_side], fists[of_side], np.linalg.norm(tips[of_side], axis=1), share[of_side])
+    elevations = np.concatenate([elevations, elevations]).astype(np.float32)
+    lengths = np.linalg.norm(tips, axis=1)
+    return Arms(tips[of_side], fists[of_side], lengths[of_side], share[of_side], elevations[of_side])
 
 
 def _with_outliers(fits: Floats) -> Floats:
@@ -181,10 +207,9 @@ def _with_outliers(fits: Floats) -> Floats:
 
 def _described(likelihood: Floats) -> Bearing:
     """The normal distribution, plain or folded at 90 degrees, that loses less of the likelihood."""
-    weights = likelihood / likelihood.sum()
-    mean, sigma = _moments(BEARINGS, weights)
+    mean, sigma = _moments(BEARINGS, likelihood)
     folded = np.where(np.abs(BEARINGS) > 90, np.sign(BEARINGS) * 180 - BEARINGS, BEARINGS)
-    folded_mean, folded_sigma = _moments(folded, weights)
+    folded_mean, folded_sigma = _moments(folded, likelihood)
     told = tuple(round(float(value), 4) for value in likelihood)
     if 2 * folded_sigma < sigma:
         return Bearing(folded_mean, max(LEAST_SIGMA_DEG, folded_sigma), True, told)
@@ -193,6 +218,7 @@ def _described(likelihood: Floats) -> Bearing:
 
 def _moments(values: Floats, weights: Floats) -> tuple[float, float]:
     """Mean and standard deviation of angles, degrees, on the circle about their mean."""
+    weights = weights / weights.sum()
     radians = np.radians(values)
     mean = math.degrees(math.atan2(float(weights @ np.sin(radians)), float(weights @ np.cos(radians))))
     off = (values - mean + 180) % 360 - 180

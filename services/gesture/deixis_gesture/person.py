@@ -168,6 +168,8 @@ class Person:
             bearing_sigma_deg=bearing.sigma_deg if bearing else None,
             bearing_mirrored=bearing.mirrored if bearing else False,
             bearing_likelihood=list(bearing.likelihood) if bearing else [],
+            elevation_deg=bearing.elevation_deg if bearing else None,
+            elevation_sigma_deg=bearing.elevation_sigma_deg if bearing else None,
             point_probability=arm.verdict.probability,
             point_log_odds=dict(arm.verdict.log_odds),
         )
