@@ -61,9 +61,8 @@ def _from_csv(path: Path) -> list[dict[str, Any]]:
 def _check_columns(path: Path, columns: list[str]) -> None:
     for name in CSV_COLUMNS:
         if name not in columns:
-            raise SiteError(
-                f"POI file {path}: no column '{name}'; the first line names {', '.join(CSV_COLUMNS + CSV_OPTIONAL)}, parted by commas"
-            )
+            named = ", ".join(CSV_COLUMNS + CSV_OPTIONAL)
+            raise SiteError(f"POI file {path}: no column '{name}'; the first line names {named}, parted by commas")
     for name in columns:
         if name not in CSV_COLUMNS + CSV_OPTIONAL or columns.count(name) > 1:
             raise SiteError(f"POI file {path}: column '{name[:40]}' is unknown or stands twice")
@@ -92,13 +91,13 @@ def _number(where: str, name: str, text: str) -> float:
 # --- GeoJSON ----------------------------------------------------------------------------------------------------------
 
 
-def _from_geojson(path: Path, content: Any) -> list[dict[str, Any]]:
+def _from_geojson(path: Path, content: dict[str, Any]) -> list[dict[str, Any]]:
     """Features that are points; coordinates are metres in the map frame, x, y and z, not degrees on the earth.
 
     The id is a feature's `id` or its property `poi_id`. Properties that are not ours are left alone: tools add their own.
     """
     where = f"POI file {path}"
-    if not isinstance(content, dict) or content.get("type") != "FeatureCollection" or not isinstance(content.get("features"), list):
+    if content.get("type") != "FeatureCollection" or not isinstance(content.get("features"), list):
         raise SiteError(f"{where}: not a GeoJSON FeatureCollection")
     if "crs" in content and "local" not in json.dumps(content["crs"]).lower():
         raise SiteError(f"{where}: crs: coordinates are metres in the map frame, so there is none, or one that is called local")

@@ -223,7 +223,9 @@ class Registry:
             except (CodecError, TypeError) as error:
                 raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
             if pois[poi_id].poi_id != poi_id:
-                raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: it is that of '{pois[poi_id].poi_id}'")
+                raise CorruptError(
+                    f"registry {self.path}: the entry '{poi_id}' is corrupt: it is that of '{pois[poi_id].poi_id}'"
+                )
         return pois
 
     def _commit(self, statements: Sequence[Statement]) -> None:
