@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from deixis_schemas.codec import say
+from deixis_schemas.messages import Metre
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .site import Site, SiteError, WallLine, read_yaml
@@ -35,7 +36,7 @@ class MapFile(BaseModel):
 
     image: Annotated[str, Field(min_length=1, max_length=4096)]
     resolution: float = Field(gt=0, le=10, description="Metres a cell.")
-    origin: tuple[float, float, float] = Field(
+    origin: tuple[Metre, Metre, float] = Field(
         description="Of the lower left corner in the map: x, y in metres, yaw in radians."
     )
     negate: bool = Field(default=False, description="Light is occupied, dark is free.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -44,8 +45,11 @@ def _checked(path: Path, pois: Any) -> list[SitePoi]:
 
 
 def _from_csv(path: Path) -> list[dict[str, Any]]:
-    """Rows with a header; tags are parted by `;`, and an empty cell is as if its column were not there."""
-    reader = csv.DictReader(_read(path).splitlines(), strict=True)
+    """Rows with a header; tags are parted by `;`, and an empty cell is as if its column were not there.
+
+    A cell of several lines is read as one.
+    """
+    reader = csv.DictReader(io.StringIO(_read(path), newline=""), strict=True)
     try:
         columns = reader.fieldnames or []
         _check_columns(path, list(columns))
@@ -57,9 +61,8 @@ def _from_csv(path: Path) -> list[dict[str, Any]]:
 def _check_columns(path: Path, columns: list[str]) -> None:
     for name in CSV_COLUMNS:
         if name not in columns:
-            raise SiteError(
-                f"POI file {path}: no column '{name}'; the first line names {', '.join(CSV_COLUMNS + CSV_OPTIONAL)}"
-            )
+            named = ", ".join(CSV_COLUMNS + CSV_OPTIONAL)
+            raise SiteError(f"POI file {path}: no column '{name}'; the first line names {named}, parted by commas")
     for name in columns:
         if name not in CSV_COLUMNS + CSV_OPTIONAL or columns.count(name) > 1:
             raise SiteError(f"POI file {path}: column '{name[:40]}' is unknown or stands twice")
@@ -68,7 +71,7 @@ def _check_columns(path: Path, columns: list[str]) -> None:
 def _of_row(path: Path, line: int, row: dict[str | None, Any]) -> dict[str, Any]:
     if None in row or None in row.values():
         raise SiteError(f"POI file {path}: line {line}: not as many cells as the first line has")
-    given = {str(name): text.strip() for name, text in row.items() if text.strip()}
+    given = {str(name): " ".join(text.split()) for name, text in row.items() if text.strip()}
     where = f"POI file {path}: line {line}"
     poi: dict[str, Any] = {name: given[name] for name in ("poi_id", "name") if name in given}
     poi["position_m"] = [_number(where, name, given.get(name, "")) for name in CSV_COLUMNS[1:]]
@@ -88,13 +91,13 @@ def _number(where: str, name: str, text: str) -> float:
 # --- GeoJSON ----------------------------------------------------------------------------------------------------------
 
 
-def _from_geojson(path: Path, content: Any) -> list[dict[str, Any]]:
+def _from_geojson(path: Path, content: dict[str, Any]) -> list[dict[str, Any]]:
     """Features that are points; coordinates are metres in the map frame, x, y and z, not degrees on the earth.
 
     The id is a feature's `id` or its property `poi_id`. Properties that are not ours are left alone: tools add their own.
     """
     where = f"POI file {path}"
-    if not isinstance(content, dict) or content.get("type") != "FeatureCollection" or not isinstance(content["features"], list):
+    if content.get("type") != "FeatureCollection" or not isinstance(content.get("features"), list):
         raise SiteError(f"{where}: not a GeoJSON FeatureCollection")
     if "crs" in content and "local" not in json.dumps(content["crs"]).lower():
         raise SiteError(f"{where}: crs: coordinates are metres in the map frame, so there is none, or one that is called local")

@@ -12,6 +12,7 @@ from deixis_schemas.messages import MAX_REGISTERED, Degree, Metre, Poi
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 MAX_SITE_BYTES = 4 << 20
+MAX_DEPTH = 100
 # The same by libyaml where PyYAML was built with it: 10 000 POIs in a second instead of ten.
 LOADER: type[yaml.SafeLoader | yaml.CSafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 WallEnd = tuple[Metre, Metre]
@@ -105,8 +106,28 @@ def load_yaml(path: Path, what: str) -> Any:
     try:
         if path.stat().st_size > MAX_SITE_BYTES:
             raise SiteError(f"{what} {path}: larger than {MAX_SITE_BYTES} bytes")
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=LOADER)
+        text = path.read_text(encoding="utf-8")
+        if _depth(text) > MAX_DEPTH:
+            raise SiteError(f"{what} {path}: nested more than {MAX_DEPTH} deep")
+        return yaml.load(text, Loader=LOADER)
     except OSError as error:
         raise SiteError(f"{what} {path}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise SiteError(f"{what} {path}: not YAML: {' '.join(str(error).split())[:300]}") from None
+
+
+def _depth(text: str) -> int:
+    """How deep the lists and mappings of a YAML text are nested, or one more than may be.
+
+    Read as events: libyaml makes nodes by calling itself for each level, and of too many the process dies.
+    """
+    depth = deepest = 0
+    for event in yaml.parse(text, Loader=LOADER):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            deepest = max(deepest, depth)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if deepest > MAX_DEPTH:
+            break
+    return deepest

@@ -124,14 +124,52 @@ def cut_off(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def break_an_entry(path: Path) -> bytes:
+def execute(path: Path, statement: str) -> bytes:
     with closing(sqlite3.connect(path, isolation_level=None)) as database:
-        database.execute("UPDATE pois SET content = '{}' WHERE poi_id = 'p7'")
+        database.execute(statement)
         database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     return path.read_bytes()
 
 
-DAMAGES = [zero_all_but_the_first_page, overwrite, cut_off, break_an_entry]
+def break_an_entry(path: Path) -> bytes:
+    return execute(path, "UPDATE pois SET content = '{}' WHERE poi_id = 'p7'")
+
+
+def break_an_entry_of_the_site(path: Path) -> bytes:
+    return execute(path, "INSERT INTO baseline VALUES ('p7', '{}')")
+
+
+def exchange_an_id(path: Path) -> bytes:
+    return execute(path, "UPDATE pois SET poi_id = 'p7000' WHERE poi_id = 'p7'")
+
+
+def lose_a_table(path: Path) -> bytes:
+    return execute(path, "DROP TABLE pois")
+
+
+def flip_a_bit_of_a_text(path: Path) -> bytes:
+    content = path.read_bytes()
+    assert content.count(b'"poi_id":"p77"') == 1
+    path.write_bytes(content.replace(b'"poi_id":"p77"', b'"poi_id":"p7\xb7"'))
+    return path.read_bytes()
+
+
+def empty(path: Path) -> bytes:
+    path.write_bytes(b"")
+    return b""
+
+
+DAMAGES = [
+    zero_all_but_the_first_page,
+    overwrite,
+    cut_off,
+    break_an_entry,
+    break_an_entry_of_the_site,
+    exchange_an_id,
+    lose_a_table,
+    flip_a_bit_of_a_text,
+    empty,
+]
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -160,13 +198,16 @@ def test_what_was_set_aside_is_never_overwritten(tmp_path: Path) -> None:
         registry.close()
 
 
-def test_a_damaged_copy_takes_no_registrys_place(tmp_path: Path) -> None:
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_copy_takes_no_registrys_place(tmp_path: Path, damage: Callable[[Path], bytes]) -> None:
     path = tmp_path / "pois.sqlite"
     filled(path)
     overwrite(path)
-    overwrite(copy_of(path))
-    with pytest.raises(RegistryError, match="is corrupt"):
+    damage(copy_of(path))
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(RegistryError, match=r"is corrupt: .*; its last good copy pois\.sqlite\.good cannot take its place: "):
         open_registry_file(path)
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 @pytest.mark.parametrize("damage", [zero_all_but_the_first_page, overwrite])

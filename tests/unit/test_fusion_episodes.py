@@ -524,7 +524,15 @@ def test_what_the_robot_does_not_see_is_no_poi_by_the_papers_rules() -> None:
         scene.fusion.set_walls([((x / 2 - 0.3, y / 2), (x / 2 + 0.3, y / 2))])
         point(scene, 60)
     assert scenes["deixis"].finals[0].poi_ids == ["g"]
-    assert "g" not in scenes["paper"].finals[0].poi_ids
+    final = scenes["paper"].finals[0]
+    assert "g" not in final.poi_ids
+    assert {told.poi_id: told.reason for told in final.excluded} == {
+        "f": "behind a wall",
+        "g": "behind a wall for the robot",
+    }
+    assert final.excluded_total == 2
+    assert "; behind a wall: 'f'; behind a wall for the robot: 'g'" in final.reason
+    assert [told.poi_id for told in scenes["deixis"].finals[0].excluded] == ["f"]
 
 
 def test_masses_of_every_source_are_shown_and_sum_to_one() -> None:

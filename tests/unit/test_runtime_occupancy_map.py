@@ -80,6 +80,7 @@ def test_negate_raw_and_png_are_read_as_map_server_does(tmp_path):
         (YAML.replace("hall.pgm", "hall.yaml"), r"image: .*hall\.yaml is not a picture"),
         (YAML.replace("0.05", "0"), "resolution"),
         (YAML.replace("[-2, -1, 0]", "[-2, -1]"), "origin"),
+        (YAML.replace("[-2, -1, 0]", "[1.0e+300, -1, 0]"), r"origin\.0"),
         (YAML.replace("trinary", "guess"), "mode"),
         ("- 1", "not a mapping"),
     ],

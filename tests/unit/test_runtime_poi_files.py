@@ -39,6 +39,13 @@ def test_csv_is_read_by_its_header(tmp_path):
     assert said(file(tmp_path, "b.CSV", "\ufeff" + CSV.replace("\n", "\r\n"))) == WANTED
 
 
+def test_a_cell_of_csv_of_several_lines_is_one_line(tmp_path):
+    for end in ("\n", "\r\n"):
+        rows = ["poi_id,name,x_m,y_m,z_m", 'vase,"the vase,', 'blue",1,2,3', "door,a\u2028b,4,0,1", ""]
+        read = said(file(tmp_path, "a.csv", end.join(rows)))
+        assert [name for name, *_ in read.values()] == ["the vase, blue", "a b"]
+
+
 @pytest.mark.parametrize("name", ["a.geojson", "a.json"])
 def test_geojson_points_are_metres_in_the_map(tmp_path, name):
     vase = feature(name="the vase, blue", extent_m=0.3, tags=["ceramics", "blue"], colour="of some other tool")
@@ -59,6 +66,7 @@ def test_a_list_and_a_site_file_are_read_as_before(tmp_path):
     [
         ("poi_id,x_m,y_m\nvase,1,2\n", "no column 'z_m'"),
         ("", "no column 'poi_id'"),
+        ("poi_id;x_m;y_m;z_m\nvase;1;2;3\n", "no column 'poi_id'.*parted by commas"),
         ("poi_id,x_m,y_m,z_m,colour\n", "column 'colour' is unknown"),
         ("poi_id,x_m,y_m,z_m,x_m\n", "column 'x_m' is unknown or stands twice"),
         ("poi_id,x_m,y_m,z_m\nvase,1,2,high\n", "line 2: z_m: 'high' is not a number"),
@@ -86,6 +94,7 @@ def test_what_is_wrong_in_csv_is_named(tmp_path, content, complaint):
         (collection(feature(None)), r"pois\.0\.poi_id"),
         (collection(feature(extent_m=-1)), r"pois\.0\.extent_m"),
         ({"type": "Point"}, "not a GeoJSON FeatureCollection"),
+        ({"type": "FeatureCollection"}, "not a GeoJSON FeatureCollection"),
         ("{", "not JSON"),
     ],
 )

@@ -44,6 +44,9 @@ def test_an_empty_site_is_a_site(tmp_path):
         ("robot_pose: {x_m: 1, z_m: 2}", "robot_pose.z_m"),
         ("- a list", "not a mapping"),
         ("a: [", "not YAML"),
+        # libyaml's own way to nodes ends the process by these.
+        ("a: " + "[" * 100_000 + "]" * 100_000, "nested more than 100 deep"),
+        ("- " * 50_000 + "a", "nested more than 100 deep"),
     ],
 )
 def test_a_bad_site_names_the_field(tmp_path, text, named):

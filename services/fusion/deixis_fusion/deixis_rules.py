@@ -47,15 +47,21 @@ class DeixisRules:
         """Weigh, and answer. `seen` is not empty."""
         sight = Sight.of(seen)
         weighed = weigh(evidence, sight, self.curves)
-        hand, head = MassVector.vacuous(len(sight)), MassVector.vacuous(len(sight))
-        if evidence.hand is not None:
-            hand = hand_masses(evidence.hand, weighed.hand, sight, self.hand_config, self.confusion)
-        if evidence.head is not None:
-            head = head_masses(evidence.head, weighed.head, weighed.head_floor, self.head_config)
+        hand, head = self._hand_masses(evidence, weighed, sight), self._head_masses(evidence, weighed)
         chances = weighed.chances(self.answer.tempering)
         choice = self.choose(weighed, chances, evidence)
         combined, conflict = combine(hand, head), weighed.contour_conflict
         return Judgement(sight, hand, head, combined, chances, choice, conflict, self.answer.credible)
+
+    def _hand_masses(self, evidence: Evidence, weighed: Weighing, sight: Sight) -> MassVector:
+        if evidence.hand is None:
+            return MassVector.vacuous(len(sight))
+        return hand_masses(evidence.hand, weighed.hand, sight, self.hand_config, self.confusion)
+
+    def _head_masses(self, evidence: Evidence, weighed: Weighing) -> MassVector:
+        if evidence.head is None:
+            return MassVector.vacuous(len(weighed.head))
+        return head_masses(evidence.head, weighed.head, weighed.head_floor, self.head_config)
 
     @cached_property
     def curves(self) -> SourceCurves:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from .config import EpisodesConfig
 from .evidence import Sample
+from .frames import FrameLog
 
 FORGOTTEN_EVERY_S = 0.5
 
@@ -23,7 +24,7 @@ class Stroke:
     last: Sample
     held_ns: int
     episode_id: str = ""
-    samples: list[Sample] = field(default_factory=list)
+    samples: FrameLog = field(default_factory=FrameLog)
     not_pointing: int = 0
     sides: Counter[str] = field(default_factory=Counter)
 
@@ -86,7 +87,8 @@ class EpisodeTracker:
         turn = self._turn[:-1]
         ended = self.open_episode
         if ended is not None:
-            ended.samples = [old for old in ended.samples if old.at_ns < turn[0].at_ns] or [ended.first]
+            before = [old for old in ended.samples if old.at_ns < turn[0].at_ns]
+            ended.samples = FrameLog(before or [ended.first])
             ended.last = ended.samples[-1]
         self.stroke, self._turn = None, []
         for old in turn:
@@ -102,7 +104,7 @@ class EpisodeTracker:
         oldest_ns = sample.at_ns - self._config.max_evidence_s * 1e9
         # Now and then: where the person was at first is where the views of a walk begin (`views.py`).
         if self.stroke.samples[0].at_ns < oldest_ns - FORGOTTEN_EVERY_S * 1e9:
-            self.stroke.samples = [kept for kept in self.stroke.samples if kept.at_ns >= oldest_ns]
+            self.stroke.samples = FrameLog(kept for kept in self.stroke.samples if kept.at_ns >= oldest_ns)
 
     def _open_if_long_enough(self) -> None:
         stroke = self.stroke

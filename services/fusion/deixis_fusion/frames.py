@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import compress
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -17,25 +17,82 @@ Values = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 FULL_TURN_DEG = 360.0
+FIRST_ROWS = 64
+
+
+class FrameLog(Sequence[Sample]):
+    """Frames of a stroke as they come, and what each showed, so that with each new frame one row is written and no more.
+
+    Only rows beyond those there are get written: what was taken from a log before stays as it was.
+    """
+
+    def __init__(self, samples: Iterable[Sample] = ()) -> None:
+        self._samples: list[Sample] = []
+        self._rows = np.empty((FIRST_ROWS, len(ROW)))
+        self._curves = np.empty((FIRST_ROWS, BEARINGS))
+        for sample in samples:
+            self.append(sample)
+
+    def append(self, sample: Sample) -> None:
+        """One more frame."""
+        count = len(self._samples)
+        if count == len(self._rows):
+            self._rows, self._curves = _doubled(self._rows), _doubled(self._curves)
+        self._rows[count] = np.frombuffer(sample.row)
+        self._curves[count] = np.frombuffer(sample.curve) if sample.curve else 0.0
+        self._samples.append(sample)
+
+    @property
+    def table(self) -> Values:
+        """What each frame showed in numbers (n, columns)."""
+        return self._rows[: len(self)]
+
+    @property
+    def curves(self) -> Values:
+        """Of each frame the likelihoods of bearings (n, `BEARINGS`), 0 where it tells none."""
+        return self._curves[: len(self)]
+
+    def __len__(self) -> int:
+        return len(self._samples)
+
+    @overload
+    def __getitem__(self, i: int) -> Sample: ...
+    @overload
+    def __getitem__(self, i: slice) -> list[Sample]: ...
+    def __getitem__(self, i: int | slice) -> Sample | list[Sample]:
+        return self._samples[i]
+
+    def __iter__(self) -> Iterator[Sample]:
+        return iter(self._samples)
+
+    def __reversed__(self) -> Iterator[Sample]:
+        return reversed(self._samples)
+
+
+def _doubled(rows: Values) -> Values:
+    return np.concatenate([rows, np.empty_like(rows)])
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Frames in their order, the weight of each (n), and what each showed in numbers (n, columns): see `evidence.Row`."""
+    """Frames in their order, the weight of each (n), and what each showed: numbers (n, columns), see `evidence.ROW`, and the
+    likelihoods of bearings (n, `BEARINGS`), 0 where it tells none.
+    """
 
     samples: Sequence[Sample]
     weights: Values
     table: Values
+    curves: Values
 
     @staticmethod
     def of(samples: Sequence[Sample], weights: Values | None = None) -> Frames:
         """These frames, all of weight 1 where none is given."""
-        table = np.frombuffer(b"".join([sample.row for sample in samples])).reshape(len(samples), len(ROW))
-        return Frames(samples, np.ones(len(samples)) if weights is None else weights, table)
+        log = samples if isinstance(samples, FrameLog) else FrameLog(samples)
+        return Frames(samples, np.ones(len(samples)) if weights is None else weights, log.table, log.curves)
 
     def weighed(self, weights: Values) -> Frames:
         """The same frames with these weights."""
-        return Frames(self.samples, weights, self.table)
+        return Frames(self.samples, weights, self.table, self.curves)
 
     @cached_property
     def _unknown(self) -> Flags:
@@ -50,23 +107,19 @@ class Frames:
 
     def __getitem__(self, part: slice) -> Frames:
         """Consecutive frames."""
-        return Frames(self.samples[part], self.weights[part], self.table[part])
+        return Frames(self.samples[part], self.weights[part], self.table[part], self.curves[part])
 
     def column(self, name: str) -> Values:
         """One of the numbers, of each frame (n); not a number where a frame does not tell."""
         return self.table[:, ROW[name]]
-
-    def curves(self, which: Flags) -> Values:
-        """The likelihoods of bearings of those of the frames (m, `BEARINGS`), each of which tells one."""
-        told = b"".join([sample.curve for sample in compress(self.samples, which.tolist())])
-        return np.frombuffer(told).reshape(-1, BEARINGS)
 
     def placed(self) -> Frames:
         """Those of which is known where the person stood."""
         known = self.tells("axis_deg")
         if known.all():
             return self
-        return Frames([self.samples[int(i)] for i in np.flatnonzero(known)], self.weights[known], self.table[known])
+        samples = [self.samples[int(i)] for i in np.flatnonzero(known)]
+        return Frames(samples, self.weights[known], self.table[known], self.curves[known])
 
     def turns_to(self, axis_deg: float | None) -> Values:
         """What is added to bearings of each frame (n), to have them from the direction `axis_deg` in the map; degrees.

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
 from deixis_runtime.lens import LensError
 from deixis_schemas.messages import (
     MAX_PERSONS,
@@ -211,15 +212,17 @@ class Fusion:
     def _assess(self, person: _Person, evidence: Evidence, moment: _Moment, stroke: Stroke | None) -> Assessment:
         """What is thought of the person, seen from where a stroke was last seen: who points and walks off means the same."""
         place, judgement = (last_place(stroke.samples) if stroke else None) or person.locator.place, None
-        hidden = NONE
+        hidden = robot_blind = NONE
         if place is not None:
             seen, hidden = person.lookout.look(place, self._points, self._walls), person.lookout.hidden
             if self._config.rules == "paper":
-                seen = seen_by_both(seen, place, self._walls, self._config.place.wall_clearance_m)
+                by_person = seen
+                seen = seen_by_both(by_person, place, self._walls, self._config.place.wall_clearance_m)
+                robot_blind = np.setdiff1d(by_person.chosen, seen.chosen)
             judgement = self._rules.judge(seen, evidence) if len(seen) else None
         if judgement is not None:
             judgement = person.caution.judged(judgement, evidence)
-        return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt, hidden)
+        return Assessment(place, evidence, judgement, self._points.pois, moment.robot.doubt, hidden, robot_blind)
 
     def _final(self, person: _Person, ended: Stroke | None, moment: _Moment, now_ns: int | None) -> list[Target]:
         if ended is None:

@@ -69,7 +69,7 @@ def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, 
     """
     if not told.any():
         return ()
-    weights, curves = frames.weights[told], frames.curves(told)
+    weights, curves = frames.weights[told], frames.curves[told]
     steps = np.rint(turns_deg[told] / SAME_AXIS_DEG)
     if not steps.any():
         return tuple((weights @ curves / weights.sum()).tolist())

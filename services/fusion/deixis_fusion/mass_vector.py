@@ -80,7 +80,10 @@ class MassVector:
     @cached_property
     def unknown(self) -> float:
         """m(X): the mass of the whole frame, which says nothing."""
-        return float(self.single[0]) if self.size == 1 else float(self.masses[self.sizes == self.size].sum())
+        if self.size == 1:
+            return float(self.single[0])
+        of_sizes = zip(self.sizes.tolist(), self.masses.tolist(), strict=True)
+        return math.fsum(mass for size, mass in of_sizes if size == self.size)
 
     def plausibilities(self) -> Values:
         """Pl({i}) of each hypothesis."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from deixis_schemas.messages import MAX_TEXT, Poi
 
-from .assessment import Assessment
+from .assessment import BEHIND_A_WALL, ROBOT_BLIND, Assessment
 from .decision import Judgement
 from .evidence import HandObservation, HeadObservation
 
@@ -21,7 +21,11 @@ def explain(told: Assessment) -> str:
     observed = f"The person {hand_words(evidence.hand)} and {head_words(evidence.head)}"
     robot = f"; robot/pose is in doubt: {told.doubt}" if told.doubt else ""
     if judgement is None:
-        why = "no POI is in sight of the person" if told.place else "where the person stands is not known"
+        why = (
+            f"no POI is in sight of the person{' and the robot' if len(told.robot_blind) else ''}"
+            if told.place
+            else "where the person stands is not known"
+        )
         return cut(f"{observed}; no answer: {why}{_hidden(told)}{robot}.", MAX_TEXT)
     if not judgement.choice.hypotheses:
         return cut(f"{observed}; no answer: {judgement.choice.abstains}{_hidden(told)}{robot}.", MAX_TEXT)
@@ -30,12 +34,15 @@ def explain(told: Assessment) -> str:
 
 
 def _hidden(told: Assessment) -> str:
-    """Whom a wall hides, the nearest first."""
-    if not len(told.hidden):
-        return ""
-    names = [f"'{title(poi)}'" for poi in told.nearest_hidden(MAX_HIDDEN_NAMED)]
-    more = f" and {len(told.hidden) - len(names)} more" if len(told.hidden) > len(names) else ""
-    return f"; behind a wall: {', '.join(names)}{more}"
+    """Whom a wall hides from person or robot, the nearest first."""
+    named = told.nearest_excluded(MAX_HIDDEN_NAMED)
+    words = "".join(
+        f"; {why}: {', '.join(names)}"
+        for why in (BEHIND_A_WALL, ROBOT_BLIND)
+        if (names := [f"'{title(poi)}'" for poi, reason in named if reason == why])
+    )
+    more = told.excluded_total - len(named)
+    return f"{words} and {more} more" if more else words
 
 
 def _answer_words(judgement: Judgement) -> str:

@@ -205,7 +205,8 @@ class Registry:
     def _load(self) -> dict[str, Poi]:
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
-            raise CorruptError(f"registry {self.path}: is corrupt: {verdict}")
+            raise CorruptError(f"registry {self.path}: is corrupt: {' '.join(verdict.split())}")
+        self._read("SELECT poi_id, content FROM baseline")
         return self._read("SELECT poi_id, content FROM pois")
 
     def _baseline(self) -> dict[str, Poi]:
@@ -221,6 +222,10 @@ class Registry:
                 pois[poi_id] = decode_json(Poi, content)
             except (CodecError, TypeError) as error:
                 raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
+            if pois[poi_id].poi_id != poi_id:
+                raise CorruptError(
+                    f"registry {self.path}: the entry '{poi_id}' is corrupt: it is that of '{pois[poi_id].poi_id}'"
+                )
         return pois
 
     def _commit(self, statements: Sequence[Statement]) -> None:
@@ -275,7 +280,7 @@ def _cause(error: sqlite3.Error) -> str:
 
 
 def _is_damage(error: sqlite3.Error) -> bool:
-    return any(word in str(error) for word in ("not a database", "malformed"))
+    return any(word in str(error) for word in ("not a database", "malformed", "Could not decode", "no such table"))
 
 
 def copy_of(path: Path) -> Path:

@@ -25,7 +25,6 @@ from .visibility import Candidate
 MAX_MEMBERS = 96
 # Parts of a message, which is made and validated at once, with all that is in it: one by one takes three times as long.
 Content = dict[str, object]
-BEHIND_A_WALL = "behind a wall"
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class PersonReport(NamedTuple):
             "credible": _credible(told.judgement),
             "credible_total": len(told.judgement.credible) if told.judgement else 0,
             "excluded": _excluded(told, rows.poi_id, rows.excluded),
-            "excluded_total": len(told.hidden) if rows.excluded else 0,
+            "excluded_total": told.excluded_total if rows.excluded else 0,
             "evidence": _evidence(told, self.now_ns),
             "reason": explain(told) if rows.excluded else "",
             "episode_id": self.episode_id,
@@ -103,7 +102,7 @@ class TargetReport:
             credible=_credible(told.judgement),
             credible_total=len(told.judgement.credible) if told.judgement else 0,
             excluded=_excluded(told, rows.poi_id, MAX_LISTED),
-            excluded_total=len(told.hidden),
+            excluded_total=told.excluded_total,
             evidence=_evidence(told, self.now_ns),
             reason=explain(told),
             started_ns=self.started_ns,
@@ -153,11 +152,9 @@ def _credible(judgement: Judgement | None) -> list[str]:
 
 def _excluded(told: Assessment, poi_id: str | None, most: int) -> list[Content]:
     """The nearest of the POIs that do not come into question, or the one asked for if it is among them."""
-    if poi_id is None:
-        named = told.nearest_hidden(most)
-    else:
-        named = [told.pois[i] for i in told.hidden.tolist() if told.pois[i].poi_id == poi_id][:most]
-    return [{"poi_id": poi.poi_id, "reason": BEHIND_A_WALL} for poi in named]
+    asked = (one for one in told.excluded if one.poi.poi_id == poi_id)
+    named = told.nearest_excluded(most) if poi_id is None else islice(asked, most)
+    return [{"poi_id": poi.poi_id, "reason": reason} for poi, reason in named]
 
 
 # --- evidence ---------------------------------------------------------------------------------------------------------

@@ -102,7 +102,7 @@ class Sight(Sequence[Candidate]):
         points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 3)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
-    def cases_from(self, places: Sequence[PersonPlace], part: Indices, count: int = CASES) -> Singles:
+    def cases_from(self, places: Sequence[PersonPlace], part: Indices | slice, count: int = CASES) -> Singles:
         """Bearings of a part of these POIs in all cases (v, CASES, n): from where they are seen now or, in `count` cases, from
         these v places.
         """

@@ -110,14 +110,17 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
     return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves)
 
 
-def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices, int]]:
+def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices | slice, int]]:
     """POIs that are weighed together, and in how many cases.
 
     Of a walk past very many those whose bearing is well known are weighed in few cases: each is weighed from every place.
     """
+    if len(seen) <= MANY:
+        yield slice(None), CASES
+        return
     everybody = np.arange(len(seen))
     groups = [(everybody, CASES)]
-    if places and len(seen) > MANY:
+    if places:
         well_known = seen.bearings.sigma < FEW_BELOW_DEG
         groups = [(everybody[~well_known], CASES), (everybody[well_known], FEW_CASES)]
     for which, count in groups:
