@@ -11,7 +11,7 @@ from .dice import Dice
 from .draw_bodies import Body
 from .draw_lens import Overrides, draw_fov
 from .draw_manner import Manner
-from .draw_mount import Subject, draw_mount
+from .draw_mount import draw_mount
 from .draw_plan import Move, Plan
 from .draw_pois import draw_pois
 from .draw_scripts import draw_others, draw_script, duration_of, person_of
@@ -21,8 +21,6 @@ from .geometry import wrap_deg
 from .scene import Action, Camera, Person, Place, Pointing, Quiet, ScenePoi, Waypoint
 
 ATTEMPTS = 2000
-USUAL_HEIGHT_M = 1.75
-"""Of who is not there in an empty room, for the camera's tilt."""
 HAND_ROOM_M = 0.35
 ELBOW_ROOM_M = 0.8
 """Between people; their bodies do not overlap, their outstretched arms may."""
@@ -61,6 +59,8 @@ def _attempt(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Override
         return None
     ways = [(standing.start, standing.place), *((CAMERA, place) for place in (standing.place, *places)), (CAMERA, (0.8, 0.0))]
     pois = draw_pois(dice, standing.place, CAMERA, ways, manner.spread)
+    if not (manner.spread.always_seen or plan.points):
+        pois = [poi.model_copy(update={"exhibit": None}) for poi in pois]
     script = draw_script(dice, plan, standing, pois, manner)
     if script is None:
         return None
@@ -70,8 +70,7 @@ def _attempt(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Override
     duration_s = duration_of(dice, people)
     path = _draw_path(dice, plan.move, duration_s)
     sights = _sights(people, standing, places, pois, duration_s, hands=not plan.hand_may_leave)
-    subject = Subject(math.dist(standing.place, CAMERA), bodies[0].height_m if bodies else USUAL_HEIGHT_M)
-    camera = draw_mount(dice, manner.mounts, fov_deg, height_m, subject, sights)
+    camera = draw_mount(dice, manner.mounts, fov_deg, height_m, math.dist(standing.place, CAMERA), sights)
     if camera is None or not fits(sights, camera, path, manner.mounts.frame):
         return None
     if _meets(people, standing, places, pois, manner.stands.clear_m):

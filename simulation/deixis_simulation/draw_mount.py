@@ -16,13 +16,13 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Mounts:
-    """Cameras on robots. looks_at: height that stands in the picture's middle where the first person is, of the person's own,
+    """Cameras on robots. looks_above_m: what stands in the picture's middle where the first person is, so much above the lens,
     from and to; none: the middle of what has to be in the picture. tilt_deg (off that), level_deg: standard deviation and
     limit; aslant: share of those that are mounted badly. frame: what people have to fit.
     """
 
     height_m: Range = (0.6, 1.7)
-    looks_at: Range | None = None
+    looks_above_m: Range | None = None
     tilt_deg: Range = (4, 12)
     level_deg: Range = (1.2, 4)
     aslant: float = 0.18
@@ -32,25 +32,16 @@ class Mounts:
 ANY_MOUNTS = Mounts()
 
 
-@dataclass(frozen=True)
-class Subject:
-    """The first person as the camera has it: its distance and height."""
-
-    away_m: float
-    height_m: float
-
-
 def draw_mount(
-    dice: Dice, mounts: Mounts, fov_deg: float, height_m: float, subject: Subject, sights: Sequence[Sight]
+    dice: Dice, mounts: Mounts, fov_deg: float, height_m: float, away_m: float, sights: Sequence[Sight]
 ) -> Camera | None:
-    """The camera, by default of the usual size; none where it would be tilted too far."""
+    """The camera, of the usual size; none where it would be tilted too far. away_m: to the first person."""
     position = (0.0, 0.0, height_m)
     tilt = dice.near(0, *_about_zero(mounts.tilt_deg), 2)
     level, aslant = dice.near(0, *_about_zero(mounts.level_deg), 2), dice.between(-9, 9, 2)
     roll = aslant if dice.chance(mounts.aslant) else level
-    if mounts.looks_at is not None:
-        rise = dice.between(*mounts.looks_at) * subject.height_m - height_m
-        middle = math.degrees(math.atan2(rise, subject.away_m))
+    if mounts.looks_above_m is not None:
+        middle = math.degrees(math.atan2(dice.between(*mounts.looks_above_m), away_m))
     else:
         middle = pitch_to(sights, position) if sights else 0.0
     pitch = middle + tilt

@@ -60,7 +60,9 @@ PLAIN = Manner(
         gaps_deg=GAPS_DEG,
         distance_m=(1.7, 2.5),
         height_m=(1.1, 1.4),
-        exhibit_gap_deg=25.0,
+        seen_from_deg=50.0,
+        seen_gap_deg=25.0,
+        always_seen=False,
     ),
     habits=Habits(
         arm_reach_deg=REACH_DEG - FRONT_DEG,
@@ -84,7 +86,7 @@ PLAIN = Manner(
     ),
     mounts=Mounts(
         height_m=(1.2, 1.4),
-        looks_at=(0.72, 0.8),
+        looks_above_m=(0.0, 0.13),
         tilt_deg=(0.5, 1.5),
         level_deg=(0.3, 1.0),
         aslant=0.0,
@@ -118,7 +120,7 @@ PLAIN = Manner(
             "plaster": ((205, 203, 196), (150, 156, 164), (112, 140, 182), (176, 162, 138)),
             "brick": ((158, 104, 84),),
         },
-        floor_skin_like=0.0,
+        floor_paints={"wood": ((128, 92, 62),), "carpet": ((92, 94, 98), (122, 120, 116))},
         furniture=("door", "cabinet", "books", "board", "poster", "plant", "window", "cardboard"),
         pieces=(2, 4),
         furniture_tinted=0.0,

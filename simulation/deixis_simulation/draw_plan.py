@@ -55,6 +55,11 @@ class Plan:
     second_pointer: bool
     hand_may_leave: bool
 
+    @property
+    def points(self) -> bool:
+        """Whether the first person points."""
+        return self.plot in ("point", "in_point")
+
 
 def draw_plan(dice: Dice, kind: Kind, plots: Plots = ANY_PLOTS) -> Plan:
     """The plan of a scene of this kind."""

@@ -20,7 +20,8 @@ EXHIBITS: tuple[ExhibitKind, ...] = ("vase", "sphere", "cube", "cup", "bust", "p
 class Spread:
     """Where POIs are: within `within_deg` of the direction to the camera, to either side; distance and height from, to.
     gaps_deg: all around at one of these gaps; where there are none, COUNT of them at any gap from MIN_GAP_DEG.
-    exhibit_gap_deg: of POIs nearer than that to the last one that is seen, nothing is drawn.
+    What stands there is seen of POIs `seen_from_deg` and more off the direction to the camera, `seen_gap_deg` from each other,
+    and in scenes in which nobody points only where `always_seen`.
     """
 
     within_deg: float = 145.0
@@ -28,7 +29,9 @@ class Spread:
     distance_m: tuple[float, float] = (1.0, 4.0)
     height_m: tuple[float, float] = (0.3, 2.0)
     bare_share: float = 0.08
-    exhibit_gap_deg: float = 0.0
+    seen_from_deg: float = 0.0
+    seen_gap_deg: float = 0.0
+    always_seen: bool = True
 
 
 ANY_SPREAD = Spread()
@@ -43,8 +46,8 @@ def draw_pois(
     for number, azimuth in enumerate(_draw_azimuths(dice, spread), 1):
         x, y = place_at(person, toward + azimuth, dice.between(*spread.distance_m))
         kind, bare = dice.one(EXHIBITS), dice.chance(spread.bare_share)
-        crowded = azimuth - last_seen < spread.exhibit_gap_deg
-        stands = not bare and not crowded and all(off_line_m((x, y), *way) >= CLEARANCE_M for way in keep_free)
+        may_stand = abs(azimuth) >= spread.seen_from_deg and azimuth - last_seen >= spread.seen_gap_deg
+        stands = not bare and may_stand and all(off_line_m((x, y), *way) >= CLEARANCE_M for way in keep_free)
         last_seen = azimuth if stands else last_seen
         pois.append(
             ScenePoi(

@@ -20,14 +20,14 @@ GAP_M = 1.3
 
 @dataclass(frozen=True)
 class Rooms:
-    """What rooms are made of, by weight. paints: of walls of a kind, each a little darker or brighter; any colour where there
-    are none. floor_skin_like (beside greys of 0.4 and dark woods of 0.3), furniture_tinted: in the colours of skin.
+    """What rooms are made of, by weight. paints, floor_paints: of walls and floors of a kind, each a little darker or brighter;
+    any colour where there are none. furniture_tinted: share in the colours of skin.
     """
 
     walls: Mapping[WallKind, float] = field(default_factory=lambda: {"plaster": 0.5, "brick": 0.15, "wood": 0.2, "panel": 0.15})
     floors: Mapping[FloorKind, float] = field(default_factory=lambda: {"wood": 0.45, "stone": 0.25, "carpet": 0.3})
     paints: Mapping[WallKind, Sequence[Tone]] = field(default_factory=dict)
-    floor_skin_like: float = 0.3
+    floor_paints: Mapping[FloorKind, Sequence[Tone]] = field(default_factory=dict)
     furniture: tuple[FurnitureKind, ...] = FURNITURE
     pieces: tuple[int, int] = (1, 5)
     furniture_tinted: float = 0.4
@@ -46,17 +46,18 @@ def draw_room(dice: Dice, reach: Sequence[Place], rooms: Rooms = ANY_ROOMS) -> R
     paints = rooms.paints.get(wall, ())
     tone = _draw_tone(dice, paints)
     side = tone if dice.chance(0.7) else _draw_tone(dice, paints)
+    ceiling_m, floor = dice.between(2.5, 4.0, 2), dice.weighed(rooms.floors)
     return Room(
         front_x_m=round(front, 2),
         back_x_m=round(back, 2),
         left_y_m=round(left, 2),
         right_y_m=round(right, 2),
-        ceiling_m=dice.between(2.5, 4.0, 2),
+        ceiling_m=ceiling_m,
         wall=wall,
         wall_tone=tone,
         side_tone=side,
-        floor=dice.weighed(rooms.floors),
-        floor_tone=_draw_floor_tone(dice, rooms),
+        floor=floor,
+        floor_tone=_draw_floor_tone(dice, rooms.floor_paints.get(floor, ())),
         furniture=_draw_furniture(dice, round(right, 2), round(left, 2), rooms),
     )
 
@@ -64,18 +65,24 @@ def draw_room(dice: Dice, reach: Sequence[Place], rooms: Rooms = ANY_ROOMS) -> R
 def _draw_tone(dice: Dice, paints: Sequence[Tone]) -> Tone:
     """Of a wall: one of these, or skin-like, or a light paint with a slight hue, or a strong one."""
     if paints:
-        (red, green, blue), shade = dice.one(paints), dice.between(0.9, 1.1)
-        return round(red * shade), round(green * shade), round(blue * shade)
+        return _shaded(dice, paints)
     skin_like, light = dice.one(SKIN_LIKE), dice.whole(140, 225)
     plain = (light, light - dice.whole(0, 12), light - dice.whole(0, 26))
     strong = (dice.whole(40, 200), dice.whole(50, 190), dice.whole(50, 200))
     return dice.weighed({skin_like: SKIN_LIKE_SHARE, plain: 0.5, strong: 0.15})
 
 
-def _draw_floor_tone(dice: Dice, rooms: Rooms) -> Tone:
+def _shaded(dice: Dice, paints: Sequence[Tone]) -> Tone:
+    (red, green, blue), shade = dice.one(paints), dice.between(0.9, 1.1)
+    return round(red * shade), round(green * shade), round(blue * shade)
+
+
+def _draw_floor_tone(dice: Dice, paints: Sequence[Tone]) -> Tone:
+    if paints:
+        return _shaded(dice, paints)
     skin_like, grey = dice.one(SKIN_LIKE), dice.whole(50, 150)
     dark = (dice.whole(60, 140), dice.whole(50, 100), dice.whole(40, 80))
-    return dice.weighed({skin_like: rooms.floor_skin_like, (grey, grey, grey - 6): 0.4, dark: 0.3})
+    return dice.weighed({skin_like: 0.3, (grey, grey, grey - 6): 0.4, dark: 0.3})
 
 
 def _draw_furniture(dice: Dice, right_y_m: float, left_y_m: float, rooms: Rooms) -> list[Furniture]:

@@ -30,7 +30,7 @@ def draw_script(dice: Dice, plan: Plan, standing: Standing, pois: Sequence[Scene
     """Actions of the first person; none where the plan cannot be done with these POIs or not in time."""
     habits = manner.habits
     row, start_s = _draw_walk(dice, plan, standing, manner)
-    if plan.plot in ("point", "in_point"):
+    if plan.points:
         if plan.gesture_before:
             before = draw_quiet(dice, start_s, habits)
             row, start_s = [*row, before], before.end_s + 0.3
