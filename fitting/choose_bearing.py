@@ -1,6 +1,6 @@
 """Chooses how exactly arms are seen, and how often not at all: constants of `deixis_gesture/bearing.py` (`TRIED`).
 
-usage: python fitting/choose_bearing.py [--seeds A:B] [--kind KIND]
+usage: python fitting/choose_bearing.py [--seeds A:B] [--kind KIND] [--plain]
 
 Tracker and gesture stage play the clips of these seeds (default: those of 0:20 with one person who points); for each value of
 each constant, the others as they stand, it is said how likely it makes the true bearings of the pointings that are recognised
@@ -42,8 +42,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", default="0:20")
     parser.add_argument("--kind", default="point", help="of the simulator's clips (default: point)")
+    parser.add_argument("--plain", action="store_true", help="plain clips of these seeds, without difficulties")
     given = parser.parse_args()
-    clips = choose(Choice(None, given.seeds, kinds=(given.kind,)), Console(stderr=True)).clips
+    clips = choose(Choice(None, given.seeds, kinds=(given.kind,), plain=given.plain), Console(stderr=True)).clips
     strokes = [stroke for clip in clips for stroke in asked_in(clip)]
     for name, values in TRIED.items():
         stands = getattr(bearing, name)

@@ -1,6 +1,6 @@
 """Chooses how sure the regression of head pose is, and how its looks are filtered, on seeds that nothing was fitted on.
 
-usage: python fitting/choose_headpose.py [DIR | --seeds A:B] [--looks FILE]
+usage: python fitting/choose_headpose.py [DIR | --seeds A:B [--plain]] [--looks FILE]
 
 Every head of every clip is read once, look by look (kept in --looks). Then, one after the other:
 * `Calibration`: gain, apart and floor of yaw, pitch, roll, by how likely they make the errors (Student's t with 4 degrees of
@@ -64,6 +64,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR")
     parser.add_argument("--seeds", metavar="A:B")
+    parser.add_argument("--plain", action="store_true", help="plain clips of these seeds, without difficulties")
     parser.add_argument("--looks", type=Path, help="keep what was read there, for the next run")
     given = parser.parse_args()
     cv2.setNumThreads(1)
@@ -83,7 +84,7 @@ def _readings(given: argparse.Namespace) -> list[list[Reading]]:
     if given.looks is not None and given.looks.exists():
         return list(pickle.loads(given.looks.read_bytes()))
     heads = []
-    for clip in choose(Choice(given.folder, given.seeds), Console(stderr=True)).clips:
+    for clip in choose(Choice(given.folder, given.seeds, plain=given.plain), Console(stderr=True)).clips:
         heads += read_clip(clip)
         print(f"{clip.name}: read", file=sys.stderr)
     if given.looks is not None:

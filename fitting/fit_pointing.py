@@ -1,7 +1,7 @@
 """Fits what tells a pointing hand from others (`deixis_gesture/pointing.npz`), in two steps.
 
 usage: python fitting/fit_pointing.py frames [--seeds A:B] [--check C:D]
-       python fitting/fit_pointing.py strokes [--seeds A:B] [--check C:D]
+       python fitting/fit_pointing.py strokes [--seeds A:B] [--check C:D] [--plain]
 
 frames: single frames, on hands of the simulator's fitting people (`deixis_simulation.held_hands`), cut out as badly as a
 tracker does (`hand_outlines.py`). strokes: whole strokes, on what tracker and gesture stage make of the simulator's clips;
@@ -44,11 +44,14 @@ def main() -> int:
     parser.add_argument("step", choices=("frames", "strokes"))
     parser.add_argument("--seeds", help="fit on these (default: 500:550 hands, 0:40 clips)")
     parser.add_argument("--check", help="say how well that does on these (default: 1524:1536 hands, 1000:1012 clips)")
+    parser.add_argument("--plain", action="store_true", help="strokes: of plain clips of these seeds, without difficulties")
     given = parser.parse_args()
+    if given.step == "frames" and given.plain:
+        parser.error("--plain: goes with strokes; hands are cut out of any scenes")
     if given.step == "frames":
         fitted = _frames(given.seeds or "500:550", given.check or "1524:1536")
     else:
-        fitted = _strokes(given.seeds or "0:40", given.check or "1000:1012")
+        fitted = _strokes(given.seeds or "0:40", given.check or "1000:1012", plain=given.plain)
     _write(given.step[:-1], fitted)
     return 0
 
@@ -58,8 +61,8 @@ def _frames(seeds: str, check: str) -> LogOdds:
     return _fitted(FRAME_KNOTS, fitting, checking, FRAME_STIFFNESS)
 
 
-def _strokes(seeds: str, check: str) -> LogOdds:
-    fitting, checking = (_seen_strokes(text) for text in (seeds, check))
+def _strokes(seeds: str, check: str, *, plain: bool) -> LogOdds:
+    fitting, checking = (_seen_strokes(text, plain=plain) for text in (seeds, check))
     return _fitted(STROKE_KNOTS, fitting, checking, STROKE_STIFFNESS)
 
 
@@ -87,9 +90,9 @@ def _seen_hands(seeds: str, seed: int) -> Cases:
     return Cases(measured, points.astype(float), weights, np.array(kinds))
 
 
-def _seen_strokes(seeds: str) -> Cases:
+def _seen_strokes(seeds: str, *, plain: bool) -> Cases:
     """Every stroke counts as one, however long it is; hands on their way to a pointing or from it do not count."""
-    clips = choose(Choice(None, seeds), Console(stderr=True)).clips
+    clips = choose(Choice(None, seeds, plain=plain), Console(stderr=True)).clips
     strokes: dict[int, list[SeenStroke]] = defaultdict(list)
     for seen in strokes_of(clips):
         if seen.doing != "moves":

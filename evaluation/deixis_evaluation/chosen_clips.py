@@ -19,7 +19,7 @@ from .seeds import parse_seeds, say_set
 class Choice:
     """What was asked for: a folder or seeds, and of these the clips whose names fit `pattern`.
 
-    kinds, cache, jobs: of the simulator's clips; none for the usual place, and a job a processor.
+    kinds, cache, jobs, plain: of the simulator's clips; none for the usual place, and a job a processor.
     """
 
     folder: Path | None
@@ -28,15 +28,17 @@ class Choice:
     kinds: tuple[str, ...] = ()
     cache: Path | None = None
     jobs: int | None = None
+    plain: bool = False
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The clips and where they lie; `seeds` as A:B, none for a folder."""
+    """The clips and where they lie; `seeds` as A:B, none for a folder; `plain`: whether their scenes are."""
 
     clips: Sequence[Clip]
     folder: Path
     seeds: str | None = None
+    plain: bool = False
 
 
 def choose(choice: Choice, console: Console) -> Chosen:
@@ -46,8 +48,8 @@ def choose(choice: Choice, console: Console) -> Chosen:
     if choice.seeds is not None:
         chosen = _of_seeds(choice, choice.seeds, console)
     else:
-        if choice.kinds or choice.cache is not None:
-            raise ClipError("--kinds and --cache go with --seeds; of a folder choose with --only-clips")
+        if choice.kinds or choice.cache is not None or choice.plain:
+            raise ClipError("--kinds, --cache and --plain go with --seeds; of a folder choose with --only-clips")
         assert choice.folder is not None
         chosen = Chosen(load_clips(choice.folder, choice.pattern), choice.folder)
     for clip in chosen.clips:
@@ -57,12 +59,12 @@ def choose(choice: Choice, console: Console) -> Chosen:
 
 def _of_seeds(choice: Choice, text: str, console: Console) -> Chosen:
     seeds = parse_seeds(text)
-    cache = ClipCache(choice.cache or default_root(), find_simulator(), choice.kinds)
+    cache = ClipCache(choice.cache or default_root(), find_simulator(), choice.kinds, choice.plain)
     console.print(f"{say_set(seeds)}; clips in {cache.folder}", markup=False, highlight=False, soft_wrap=True)
     clips = [clip for clip in cache.clips(seeds.numbers, choice.jobs) if fnmatchcase(clip.name, choice.pattern)]
     if not clips:
         raise ClipError(f"no clip of seeds {seeds} is named {choice.pattern}")
-    return Chosen(clips, cache.folder, str(seeds))
+    return Chosen(clips, cache.folder, str(seeds), choice.plain)
 
 
 def _check_path(clip: Clip) -> None:

@@ -31,12 +31,15 @@ class Simulator:
     jobs: Any
     progress: Any
 
-    def scenes(self, seeds: Sequence[int], kinds: Sequence[str]) -> list[Any]:
-        """Scene 0 of each seed, of one of these kinds, of any where there are none. Raises ClipError for unknown kinds."""
+    def scenes(self, seeds: Sequence[int], kinds: Sequence[str], *, plain: bool = False) -> list[Any]:
+        """Scene 0 of each seed, of one of these kinds, of any where there are none; `plain`: without difficulties.
+
+        Raises ClipError for unknown kinds.
+        """
         unknown = sorted(set(kinds) - set(self.kinds))
         if unknown:
             raise ClipError(f"--kinds: '{unknown[0]}' is none of {', '.join(self.kinds)}")
-        return [self.draw.draw_scene(seed, 0, tuple(kinds) or tuple(self.kinds)) for seed in seeds]
+        return [self.draw.draw_scene(seed, 0, tuple(kinds) or tuple(self.kinds), plain=plain) for seed in seeds]
 
     def render(self, scenes: Sequence[Any], folder: Path, jobs: int | None) -> None:
         """Render the scenes whose clips are not in the folder; label pictures too, for `--truth tracker` reads them.
@@ -57,20 +60,24 @@ class Simulator:
 
 @dataclass(frozen=True)
 class ClipCache:
-    """Folders of clips, one for each version of the simulator and choice of kinds: by it a seed gives another clip."""
+    """Folders of clips, one for each version of the simulator, choice of kinds, and whether they are plain: by each of these a
+    seed gives another clip.
+    """
 
     root: Path
     simulator: Simulator
     kinds: tuple[str, ...] = ()
+    plain: bool = False
 
     @property
     def folder(self) -> Path:
         """Where the clips lie."""
-        return self.root / self.simulator.version / ("-".join(self.kinds) or "all")
+        kinds = "-".join(self.kinds) or "all"
+        return self.root / self.simulator.version / (f"plain-{kinds}" if self.plain else kinds)
 
     def clips(self, seeds: Sequence[int], jobs: int | None) -> list[Clip]:
         """Clip 0 of each seed. Raises ClipError where one cannot be made or read, KeyboardInterrupt when stopped."""
-        scenes = self.simulator.scenes(seeds, self.kinds)
+        scenes = self.simulator.scenes(seeds, self.kinds, plain=self.plain)
         self.simulator.render(scenes, self.folder, jobs)
         videos = [self.folder / f"{scene.name}.mp4" for scene in scenes]
         return [Clip(video.stem, video, load_truth(video.with_suffix(".json"))) for video in videos]

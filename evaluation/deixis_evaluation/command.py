@@ -48,6 +48,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser("eval", help="score labelled clips", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="folder with NAME.mp4 and NAME.json")
     parser.add_argument("--seeds", metavar="A:B", help="instead of DIR: the simulator's clip of each seed from A to B - 1")
+    parser.add_argument("--plain", action="store_true", help="plain clips of these seeds, without difficulties")
     parser.add_argument("--kinds", type=_names, default=(), metavar="KINDS", help="these kinds of clips only, e.g. point,quiet")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where these clips are kept (default: in the user's cache)")
     parser.add_argument("--jobs", type=_jobs, metavar="J", help="how many are rendered at a time (default: one a processor)")
@@ -114,7 +115,7 @@ def _run_system(given: argparse.Namespace) -> int:
     except Interrupted as interrupt:
         print(f"deixis eval: {interrupt} before the end", file=sys.stderr)
         return 128 + interrupt.signal
-    conditions = Conditions(chosen.folder, given.lockstep, chosen.seeds, given.truth)
+    conditions = Conditions(chosen.folder, given.lockstep, chosen.seeds, given.truth, chosen.plain)
     return _tell(conditions, given.json, scores, slices_of(chosen.clips, scores))
 
 
@@ -123,7 +124,7 @@ def _run_headpose(given: argparse.Namespace) -> int:
     setup = check_headpose(given.truth, sets)
     chosen = _choose(given)
     check_writable(given.json)
-    conditions = HeadposeConditions(chosen.folder, chosen.seeds, given.truth, sets)
+    conditions = HeadposeConditions(chosen.folder, chosen.seeds, given.truth, sets, chosen.plain)
     return run_headpose(chosen, setup, conditions, given.out, given.json, _console())
 
 
@@ -147,7 +148,7 @@ def _run_gesture(given: argparse.Namespace) -> int:
     check_writable(given.confusion, "--confusion")
     status, scores = run_gesture(chosen, setup, sets, given.json, _console())
     if given.confusion is not None:
-        clips = f"seeds {chosen.seeds}" if chosen.seeds else f"clips of {chosen.folder.name}"
+        clips = f"{'plain ' * chosen.plain}seeds {chosen.seeds}" if chosen.seeds else f"clips of {chosen.folder.name}"
         strokes = [stroke for score in scores for stroke in score.strokes]
         write_confusion(given.confusion, strokes, f"deixis eval --stage gesture, {clips}")
     return status
@@ -168,7 +169,7 @@ RUNS_ALONE = {"headpose": _run_headpose, "tracker": _run_tracker, "gesture": _ru
 
 
 def _choose(given: argparse.Namespace) -> Chosen:
-    choice = Choice(given.folder, given.seeds, given.only_clips, given.kinds, given.cache, given.jobs)
+    choice = Choice(given.folder, given.seeds, given.only_clips, given.kinds, given.cache, given.jobs, given.plain)
     try:
         return choose(choice, Console(stderr=True))
     except (ClipError, SeedsError) as error:

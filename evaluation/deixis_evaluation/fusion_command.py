@@ -57,7 +57,14 @@ def run_fusion(
     console.print(DEFINITION, style="dim", markup=False, highlight=False)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     settings = {stage: list(values) for stage, values in sets.items()}
-    said = {"machine": machine, "stage": "fusion", "folder": str(chosen.folder), "seeds": chosen.seeds, "settings": settings}
+    said = {
+        "machine": machine,
+        "stage": "fusion",
+        "folder": str(chosen.folder),
+        "seeds": chosen.seeds,
+        "plain": chosen.plain,
+        "settings": settings,
+    }
     clips = {score.name: _clip(score) for score in scores}
     write_json(json_file, {**said, "definitions": [DEFINITION], "summary": figures(scores), "clips": clips})
     failed = sum(score.failure is not None for score in scores)

@@ -66,7 +66,14 @@ def run_gesture(
     console.print(DEFINITION, style="dim", markup=False, highlight=False)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
     settings = {stage: list(values) for stage, values in sets.items()}
-    said = {"machine": machine, "stage": "gesture", "folder": str(chosen.folder), "seeds": chosen.seeds, "settings": settings}
+    said = {
+        "machine": machine,
+        "stage": "gesture",
+        "folder": str(chosen.folder),
+        "seeds": chosen.seeds,
+        "plain": chosen.plain,
+        "settings": settings,
+    }
     truth, clips = [BEFORE] if setup.true_tracks else [], {score.name: _clip(score) for score in scores}
     summary = {"clips": len(scores), **figures(scores)}
     write_json(json_file, {**said, "truth": truth, "definitions": [DEFINITION], "summary": summary, "clips": clips})

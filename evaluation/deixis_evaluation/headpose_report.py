@@ -1,7 +1,7 @@
 """The JSON file of `deixis eval --stage headpose`. Its keys are documented here and stay:
 
-`machine`, `stage`, `folder`, `seeds` (A:B, or null), `truth` (stages that the truth stood for), `settings` (given by `--set`),
-`definitions` (sentences), `summary` and `clips.NAME`.
+`machine`, `stage`, `folder`, `seeds` (A:B, or null), `plain` (whether their scenes are), `truth` (stages that the truth stood
+for), `settings` (given by `--set`), `definitions` (sentences), `summary` and `clips.NAME`.
 * `summary`: `clips`, `failed` (names), `frames` (of the videos) and the heads' figures.
 * `clips.NAME`: `kind`, `failure`, `frames` and the heads' figures.
 * The heads' figures: `heads` over all, and `bands.BAND` by |true yaw|. Each has `frames` (a head in a frame), `status`
@@ -45,12 +45,15 @@ DEFINITIONS = (
 
 @dataclass(frozen=True)
 class HeadposeConditions:
-    """What was played and how: `truth` the stages that the truth stood for, `settings` those that were changed."""
+    """What was played and how: `truth` the stages that the truth stood for, `settings` those that were changed, `plain`: scenes
+    without difficulties.
+    """
 
     folder: Path
     seeds: str | None = None
     truth: tuple[str, ...] = ()
     settings: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    plain: bool = False
 
 
 def headpose_report(conditions: HeadposeConditions, scores: Sequence[HeadposeScore], machine: Machine) -> dict[str, Any]:
@@ -60,6 +63,7 @@ def headpose_report(conditions: HeadposeConditions, scores: Sequence[HeadposeSco
         "stage": "headpose",
         "folder": str(conditions.folder),
         "seeds": conditions.seeds,
+        "plain": conditions.plain,
         "truth": list(conditions.truth),
         "settings": {stage: list(values) for stage, values in conditions.settings.items()},
         "definitions": list(DEFINITIONS),

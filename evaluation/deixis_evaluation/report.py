@@ -1,7 +1,7 @@
 """The JSON file of `deixis eval`. Its keys are documented here and stay:
 
-`machine`, `lockstep`, `folder`, `seeds` (A:B, or null), `truth` (stages that the truth stood for), `definitions` (sentences),
-`summary`, `slices` and `clips.NAME`; shares are 0 to 1, and null where
+`machine`, `lockstep`, `folder`, `seeds` (A:B, or null), `plain` (whether their scenes are), `truth` (stages that the truth
+stood for), `definitions` (sentences), `summary`, `slices` and `clips.NAME`; shares are 0 to 1, and null where
 nothing was there to measure.
 * `summary` and `clips.NAME`: `failure` (a clip) or `failed` (names), `frames`, `frames_answered`, `latency_ms.p50|p95`,
   `face_recall`, `raised_hand_recall`, `hand_recall`, `false_hands_per_frame`, `distance_error_percent`, and
@@ -42,12 +42,13 @@ EPISODE_DEFINITION = (
 
 @dataclass(frozen=True)
 class Conditions:
-    """What was played and how: `seeds` of the simulator as A:B, `truth` the stages that the truth stood for."""
+    """What was played and how: `seeds` of the simulator as A:B, `truth` the stages that the truth stood for, `plain` scenes."""
 
     folder: Path
     lockstep: bool
     seeds: str | None = None
     truth: tuple[str, ...] = ()
+    plain: bool = False
 
 
 def report(
@@ -59,6 +60,7 @@ def report(
         "lockstep": conditions.lockstep,
         "folder": str(conditions.folder),
         "seeds": conditions.seeds,
+        "plain": conditions.plain,
         "truth": list(conditions.truth),
         "definitions": [EPISODE_DEFINITION, DEFINITION, YAW_DEFINITION],
         "summary": _summary(summary),

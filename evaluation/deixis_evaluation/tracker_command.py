@@ -73,7 +73,14 @@ def run_tracker(
     settings = {stage: list(values) for stage, values in sets.items()}
     whole = {"clips": len(scores), **figures(total_of(scores))}
     clips = {score.name: {"kind": score.kind, "failure": score.failure, **figures(score)} for score in scores}
-    said = {"machine": machine, "stage": "tracker", "folder": str(chosen.folder), "seeds": chosen.seeds, "settings": settings}
+    said = {
+        "machine": machine,
+        "stage": "tracker",
+        "folder": str(chosen.folder),
+        "seeds": chosen.seeds,
+        "plain": chosen.plain,
+        "settings": settings,
+    }
     write_json(json_file, {**said, "definitions": list(DEFINITIONS), "summary": whole, "clips": clips})
     failed = sum(score.failure is not None for score in scores)
     if failed:

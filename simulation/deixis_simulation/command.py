@@ -19,6 +19,7 @@ from deixis_cli.options import CommandError
 from .draw import MAX_SEED, draw_scene
 from .draw_layout import DrawingError
 from .draw_lens import Overrides, Size
+from .draw_plain import ASPECT as PLAIN_ASPECT
 from .framing import LOWEST_ASPECT
 from .jobs import Interrupted, Outcome, render_all
 from .progress import shown_progress
@@ -43,9 +44,12 @@ def register(subparsers: Any) -> None:
         metavar="S",
         help="below 1000: to fit on; 1000 to 1999: to choose by; from 2000: to report (default: 0)",
     )
+    parser.add_argument(
+        "--plain", action="store_true", help="plain scenes: upright camera that stands, steady light, one person or two"
+    )
     parser.add_argument("--kinds", type=_kinds, default=KINDS, metavar="KINDS", help=f"of {','.join(KINDS)} (default: all)")
     parser.add_argument("--size", type=_size, metavar="WxH", help="size of the pictures, e.g. 640x480 (default: drawn)")
-    parser.add_argument("--fov", type=_fov, metavar="A-B", help="horizontal field of view, degrees (default: 50-90)")
+    parser.add_argument("--fov", type=_fov, metavar="A-B", help="horizontal field of view, degrees (default: drawn)")
     parser.add_argument("--jobs", type=_whole(1, 256), metavar="J", help="clips at a time (default: one a processor)")
     parser.add_argument("--labels", action="store_true", help="write label pictures too, NAME_labels.npz")
     parser.add_argument(
@@ -80,18 +84,26 @@ def run(given: argparse.Namespace) -> int:
 
 
 def drawn_scenes(
-    seed: int, count: int, kinds: Sequence[Kind] = KINDS, size: Size | None = None, fov_deg: tuple[float, float] | None = None
+    seed: int,
+    count: int,
+    kinds: Sequence[Kind] = KINDS,
+    size: Size | None = None,
+    fov_deg: tuple[float, float] | None = None,
+    *,
+    plain: bool = False,
 ) -> list[Scene]:
     """The first scenes of a seed. Raises CommandError."""
+    if plain and size is not None and size[1] / size[0] < PLAIN_ASPECT:
+        raise CommandError(f"--size {size[0]}x{size[1]}: plain scenes are 4:3; wider ones would cut heads off")
     try:
-        return [draw_scene(seed, index, kinds, Overrides(size, fov_deg)) for index in range(count)]
+        return [draw_scene(seed, index, kinds, Overrides(size, fov_deg), plain=plain) for index in range(count)]
     except DrawingError as error:
         raise CommandError(str(error)) from None
 
 
 def _scenes(given: argparse.Namespace) -> list[Scene]:
     if given.scene is None:
-        return drawn_scenes(given.seed, given.count, given.kinds, given.size, given.fov)
+        return drawn_scenes(given.seed, given.count, given.kinds, given.size, given.fov, plain=given.plain)
     if not re.fullmatch(r"[A-Za-z0-9_.\-]{1,100}", given.scene.stem):
         raise CommandError(f"--scene {given.scene}: the clip gets the file's name: letters, digits, '_', '.', '-'")
     try:

@@ -25,13 +25,13 @@ class Body:
     restlessness: float
 
 
-def draw_bodies(dice: Dice, avatars: Sequence[str], count: int) -> list[Body]:
+def draw_bodies(dice: Dice, avatars: Sequence[str], count: int, child_share: float = CHILD_SHARE) -> list[Body]:
     """So many different people out of these avatars."""
-    return [_draw_body(dice, avatar) for avatar in dice.shuffled(avatars)[:count]]
+    return [_draw_body(dice, avatar, child_share) for avatar in dice.shuffled(avatars)[:count]]
 
 
-def _draw_body(dice: Dice, avatar: str) -> Body:
-    child = dice.chance(CHILD_SHARE)
+def _draw_body(dice: Dice, avatar: str, child_share: float) -> Body:
+    child = dice.chance(child_share)
     skin, warmth = dice.between(0.72, 1.2), dice.between(-0.06, 0.06)
     cloth = dice.between_log(0.35, 1.4)
     hair = dice.between_log(0.5, 1.8)

@@ -10,20 +10,20 @@ from .bearings import heading_to, place_at
 from .dice import Dice
 from .draw_bodies import Body
 from .draw_lens import Overrides, draw_fov
+from .draw_manner import Manner
+from .draw_mount import draw_mount
 from .draw_plan import Move, Plan
 from .draw_pois import draw_pois
-from .draw_scripts import CAMERA, Standing, draw_others, draw_script, draw_standing, duration_of, person_of
-from .framing import Sight, fits, head_sights, pitch_to, pointing_sights, quiet_sights
+from .draw_scripts import draw_others, draw_script, duration_of, person_of
+from .draw_stand import CAMERA, Standing, Stands, draw_standing
+from .framing import Sight, fits, head_sights, pointing_sights, quiet_sights
 from .geometry import wrap_deg
 from .scene import Action, Camera, Person, Place, Pointing, Quiet, ScenePoi, Waypoint
 
 ATTEMPTS = 2000
-CAMERA_HEIGHT_M = (0.6, 1.7)
-PITCH_LIMIT_DEG = 30.0
+HAND_ROOM_M = 0.35
 ELBOW_ROOM_M = 0.8
 """Between people; their bodies do not overlap, their outstretched arms may."""
-SEEN_APART_M = 0.5
-"""The same across the line of sight, so that none hides another for good."""
 
 
 class DrawingError(ValueError):
@@ -41,64 +41,65 @@ class Layout:
     duration_s: float
 
 
-def draw_layout(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Overrides) -> Layout:
+def draw_layout(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Overrides, manner: Manner) -> Layout:
     """The first layout that fits the picture. Raises DrawingError where none does."""
     for _ in range(ATTEMPTS):
-        layout = _attempt(dice, plan, bodies, overrides)
+        layout = _attempt(dice, plan, bodies, overrides, manner)
         if layout is not None:
             return layout
     raise DrawingError(f"no scene with head and hand in the picture among {ATTEMPTS}; is the field of view too narrow?")
 
 
-def _attempt(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Overrides) -> Layout | None:
-    fov_deg = draw_fov(dice, overrides)
-    height_m = dice.between(*CAMERA_HEIGHT_M, 2)
-    standing = draw_standing(dice, plan, fov_deg)
-    places = _draw_places(dice, standing, len(bodies), fov_deg)
+def _attempt(dice: Dice, plan: Plan, bodies: Sequence[Body], overrides: Overrides, manner: Manner) -> Layout | None:
+    fov_deg = draw_fov(dice, overrides, manner.optics)
+    height_m = dice.between(*manner.mounts.height_m, 2)
+    standing = draw_standing(dice, plan, fov_deg, manner.stands)
+    places = _draw_places(dice, standing, len(bodies), fov_deg, manner.stands)
     if places is None:
         return None
     ways = [(standing.start, standing.place), *((CAMERA, place) for place in (standing.place, *places)), (CAMERA, (0.8, 0.0))]
-    pois = draw_pois(dice, standing.place, CAMERA, ways)
-    script = draw_script(dice, plan, standing, pois)
+    pois = draw_pois(dice, standing.place, CAMERA, ways, manner.spread)
+    if not (manner.spread.always_seen or plan.points):
+        pois = [poi.model_copy(update={"exhibit": None}) for poi in pois]
+    script = draw_script(dice, plan, standing, pois, manner)
     if script is None:
         return None
-    people = [person_of(body, standing, script) for body in bodies[:1]] + draw_others(dice, plan, bodies[1:], places, pois)
+    people = [person_of(body, standing, script) for body in bodies[:1]] + draw_others(
+        dice, plan, bodies[1:], places, pois, manner
+    )
     duration_s = duration_of(dice, people)
     path = _draw_path(dice, plan.move, duration_s)
     sights = _sights(people, standing, places, pois, duration_s, hands=not plan.hand_may_leave)
-    camera = _mounted(dice, fov_deg, height_m, sights)
-    if camera is None or not fits(sights, camera, path) or _stabs(people, standing, places, pois):
+    camera = draw_mount(dice, manner.mounts, fov_deg, height_m, math.dist(standing.place, CAMERA), sights)
+    if camera is None or not fits(sights, camera, path, manner.mounts.frame):
+        return None
+    if _meets(people, standing, places, pois, manner.stands.clear_m):
         return None
     return Layout(camera, path, people, pois, duration_s)
 
 
-def _mounted(dice: Dice, fov_deg: float, height_m: float, sights: Sequence[Sight]) -> Camera | None:
-    position = (0.0, 0.0, height_m)
-    tilt = dice.near(0, 4, -12, 12, 2)
-    level, aslant = dice.near(0, 1.2, -4, 4, 2), dice.between(-9, 9, 2)
-    roll = aslant if dice.chance(0.18) else level
-    pitch = (pitch_to(sights, position) if sights else 0.0) + tilt
-    if abs(pitch) > PITCH_LIMIT_DEG:
-        return None
-    return Camera(horizontal_fov_deg=fov_deg, position_m=position, pitch_up_deg=round(pitch, 2), roll_deg=roll)
-
-
-def _draw_places(dice: Dice, first: Standing, people: int, fov_deg: float) -> list[Place] | None:
+def _draw_places(dice: Dice, first: Standing, people: int, fov_deg: float, stands: Stands) -> list[Place] | None:
     """Places of all but the first; none where they come too near."""
     places: list[Place] = []
     for _ in range(people - 1):
-        x, y = place_at(CAMERA, dice.between(-0.44, 0.44) * fov_deg, dice.between(1.2, 3.8))
+        x, y = place_at(
+            CAMERA, dice.between(-stands.others_aside, stands.others_aside) * fov_deg, dice.between(*stands.others_distance_m)
+        )
         place = (round(x, 3), round(y, 3))
-        if any(_too_near(place, other) for other in (first.place, *places)):
+        if any(_too_near(place, other, stands.apart_m) for other in (first.place, *places)):
             return None
         places.append(place)
     return places
 
 
-def _too_near(place: Place, other: Place) -> bool:
+def _too_near(place: Place, other: Place, apart_m: float) -> bool:
+    return math.dist(place, other) < ELBOW_ROOM_M or _across_m(place, other) < apart_m
+
+
+def _across_m(place: Place, other: Place) -> float:
+    """How far apart the camera sees two places, at the distance of the nearer one."""
     apart = wrap_deg(heading_to(CAMERA, place) - heading_to(CAMERA, other))
-    across = math.sin(math.radians(min(abs(apart), 90.0))) * min(math.dist(place, CAMERA), math.dist(other, CAMERA))
-    return math.dist(place, other) < ELBOW_ROOM_M or across < SEEN_APART_M
+    return math.sin(math.radians(min(abs(apart), 90.0))) * min(math.dist(place, CAMERA), math.dist(other, CAMERA))
 
 
 def _draw_path(dice: Dice, move: Move, duration_s: float) -> list[Waypoint]:
@@ -151,14 +152,17 @@ def _hand(action: Action, place: Place, heading_deg: float, height_m: float, poi
     return quiet_sights(place, heading_deg, height_m, action) if isinstance(action, Quiet) else []
 
 
-def _stabs(people: Sequence[Person], first: Standing, places: Sequence[Place], pois: Sequence[ScenePoi]) -> bool:
-    """Whether a pointing hand ends within another person."""
+def _meets(
+    people: Sequence[Person], first: Standing, places: Sequence[Place], pois: Sequence[ScenePoi], clear_m: float
+) -> bool:
+    """Whether a pointing hand ends within another person, or is seen so near to one, before or behind, as `clear_m`."""
     stands = [first.place, *places]
     for number, person in enumerate(people):
         others = [place for index, place in enumerate(stands) if index != number]
         heading = first.heading_deg if number == 0 else person.heading_deg
         for action in person.actions:
             hand = _hand(action, stands[number], heading, person.height_m, pois)
-            if any(math.dist(sight.position_m[:2], other) < 0.35 for sight in hand for other in others):
+            ends = [(sight.position_m[:2], other) for sight in hand for other in others]
+            if any(math.dist(end, other) < HAND_ROOM_M or _across_m(end, other) < clear_m for end, other in ends):
                 return True
     return False

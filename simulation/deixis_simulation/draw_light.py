@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
 from .dice import Dice
 from .scene import Light, LightChange, LightPreset
 
-PRESETS: dict[LightPreset, float] = {"office": 0.35, "window_left": 0.18, "window_right": 0.18, "warm": 0.17, "hard": 0.12}
-CHANGE_SHARE = 0.3
-FLICKER_SHARE = 0.1
+
+@dataclass(frozen=True)
+class Lamps:
+    """How rooms are lit. red, blue: factors of the tint, from and to; shares of the lights that change or flicker."""
+
+    presets: Mapping[LightPreset, float] = field(
+        default_factory=lambda: {"office": 0.35, "window_left": 0.18, "window_right": 0.18, "warm": 0.17, "hard": 0.12}
+    )
+    red: tuple[float, float] = (0.92, 1.08)
+    blue: tuple[float, float] = (0.88, 1.08)
+    change_share: float = 0.3
+    flicker_share: float = 0.1
 
 
-def draw_light(dice: Dice, duration_s: float, *, empty: bool) -> Light:
+ANY_LAMPS = Lamps()
+
+
+def draw_light(dice: Dice, duration_s: float, *, empty: bool, lamps: Lamps = ANY_LAMPS) -> Light:
     """A light; in an empty room it always changes or flickers, for there nothing else happens."""
-    preset = dice.weighed(PRESETS)
-    tint = (dice.between(0.92, 1.08), 1.0, dice.between(0.88, 1.08))
-    flickers = dice.chance(0.6 if empty else FLICKER_SHARE)
+    preset = dice.weighed(lamps.presets)
+    tint = (dice.between(*lamps.red), 1.0, dice.between(*lamps.blue))
+    flickers = dice.chance(0.6 if empty else lamps.flicker_share)
     depth, rate_hz = dice.between(0.05, 0.4 if empty else 0.2), dice.between_log(0.7, 12, 2)
-    changes = dice.chance(CHANGE_SHARE) or (empty and not flickers)
+    changes = dice.chance(lamps.change_share) or (empty and not flickers)
     return Light(
         preset=preset,
         tint=tint,

@@ -1,22 +1,22 @@
-"""What the first person and the others do, by the plan, and from which place to which they go."""
+"""What the first person and the others do, by the plan."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from .bearings import azimuth_of, heading_to, place_at
+from .bearings import heading_to
 from .dice import Dice
-from .draw_actions import Target, draw_pointings, draw_quiet, draw_quiets, draw_turns
+from .draw_actions import draw_nods, draw_pointings, draw_quiet, draw_quiets, draw_turns
 from .draw_bodies import Body
+from .draw_manner import Manner
 from .draw_plan import Plan
+from .draw_stand import CAMERA, Standing, draw_front
 from .geometry import wrap_deg
 from .scene import Action, Person, Place, ScenePoi, Walk
 
 LONGEST_S = 7.0
 SHORTEST_S = 4.0
-CAMERA: Place = (0.0, 0.0)
 WALK_PACE_M_S = (0.8, 1.5)
 WALK_RAMPS_S = 0.6
 """What starting and stopping add to the time that a way takes at full pace."""
@@ -26,90 +26,47 @@ SETTLE_S = (-0.3, 0.4)
 """Between the end of the walk and what follows: some begin while they still turn."""
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Where a person stands while it acts, and comes from where it walks. Headings in the map, degrees."""
-
-    place: Place
-    heading_deg: float
-    start: Place
-
-    @property
-    def walks(self) -> bool:
-        """Whether it comes from elsewhere."""
-        return self.start != self.place
-
-    @property
-    def front_deg(self) -> float:
-        """Azimuth of the body's front."""
-        return wrap_deg(self.heading_deg - heading_to(self.place, CAMERA))
-
-    def targets(self, pois: Sequence[ScenePoi]) -> list[Target]:
-        """All POIs as this person has them."""
-        front = self.front_deg
-        return [
-            Target(poi.poi_id, wrap_deg(azimuth_of(self.place, CAMERA, poi.position_m[:2]) - front))
-            for poi in pois
-            if math.dist(self.place, poi.position_m[:2]) > 0.5
-        ]
-
-
-def draw_front(dice: Dice) -> float:
-    """Azimuth of a body's front: mostly toward the robot, sometimes well aside."""
-    near, far = dice.near(0, 16, -45, 45, 1), dice.between(-65, 65, 1)
-    return far if dice.chance(0.2) else near
-
-
-def draw_standing(dice: Dice, plan: Plan, fov_deg: float) -> Standing:
-    """Place and heading of the first person."""
-    bearing = dice.between(-0.36, 0.36) * fov_deg
-    place = place_at(CAMERA, bearing, dice.between(1.1, 3.5))
-    heading = heading_to(place, CAMERA) + draw_front(dice)
-    if plan.plot == "through":
-        return _crossing(dice, fov_deg, math.dist(place, CAMERA))
-    if plan.plot in ("in_point", "in_gestures"):
-        return Standing(_rounded(place), wrap_deg(heading), _rounded(_entrance(dice, place, bearing, fov_deg)))
-    return Standing(_rounded(place), round(wrap_deg(heading), 1), _rounded(place))
-
-
-def draw_script(dice: Dice, plan: Plan, standing: Standing, pois: Sequence[ScenePoi]) -> list[Action] | None:
+def draw_script(dice: Dice, plan: Plan, standing: Standing, pois: Sequence[ScenePoi], manner: Manner) -> list[Action] | None:
     """Actions of the first person; none where the plan cannot be done with these POIs or not in time."""
-    row, start_s = _draw_walk(dice, plan, standing)
-    if plan.plot in ("point", "in_point"):
+    habits = manner.habits
+    row, start_s = _draw_walk(dice, plan, standing, manner)
+    if plan.points:
         if plan.gesture_before:
-            before = draw_quiet(dice, start_s)
+            before = draw_quiet(dice, start_s, habits)
             row, start_s = [*row, before], before.end_s + 0.3
-        pointings = draw_pointings(dice, start_s, standing.targets(pois), plan.count)
+        pointings = draw_pointings(dice, start_s, standing.targets(pois), plan.count, habits)
         row = [*row, *pointings]
         if len(pointings) < plan.count:
             return None
     elif plan.plot in ("gestures", "in_gestures"):
-        row = [*row, *draw_quiets(dice, start_s, LONGEST_S - 0.4, plan.count)]
+        row = [*row, *draw_quiets(dice, start_s, LONGEST_S - 0.4, plan.count, habits)]
     elif plan.plot == "turns":
-        row = [*row, *draw_turns(dice, start_s, LONGEST_S - 0.4, standing.front_deg, plan.count)]
+        row = [*row, *draw_turns(dice, start_s, LONGEST_S - 0.4, standing.front_deg, plan.count, habits)]
+    elif plan.plot == "nods":
+        row = [*row, *draw_nods(dice, start_s, plan.count)]
     elif plan.plot == "mixed":
-        turns = draw_turns(dice, start_s, 3.2, standing.front_deg, 1)
-        row = [*row, *turns, *draw_quiets(dice, max(_end_s(turns), start_s) + 0.3, LONGEST_S - 0.4, 1)]
+        turns = draw_turns(dice, start_s, 3.2, standing.front_deg, 1, habits)
+        row = [*row, *turns, *draw_quiets(dice, max(_end_s(turns), start_s) + 0.3, LONGEST_S - 0.4, 1, habits)]
     return row if _end_s(row) <= LONGEST_S - 0.3 else None
 
 
 def draw_others(
-    dice: Dice, plan: Plan, bodies: Sequence[Body], places: Sequence[Place], pois: Sequence[ScenePoi]
+    dice: Dice, plan: Plan, bodies: Sequence[Body], places: Sequence[Place], pois: Sequence[ScenePoi], manner: Manner
 ) -> list[Person]:
     """The company of the first person: gesture, look about or stand; sometimes one more points."""
-    people = []
+    habits, people = manner.habits, []
     for number, (body, place) in enumerate(zip(bodies, places, strict=True)):
-        heading = round(wrap_deg(heading_to(place, CAMERA) + draw_front(dice)), 1)
+        heading = round(wrap_deg(heading_to(place, CAMERA) + draw_front(dice, manner.stands)), 1)
         standing = Standing(place, heading, place)
         start_s, points = dice.between(0.5, 2.0, 2), plan.second_pointer and plan.plot == "point" and number == 0
         acts = dice.weighed({"quiet": 0.4, "turn": 0.25, "idle": 0.35})
         row: list[Action] = []
         if points:
-            row = draw_pointings(dice, start_s, standing.targets(pois), 1)
+            row = draw_pointings(dice, start_s, standing.targets(pois), 1, habits)
         elif acts == "quiet":
-            row = draw_quiets(dice, start_s, LONGEST_S - 0.4, dice.whole(1, 2))
+            row = draw_quiets(dice, start_s, LONGEST_S - 0.4, dice.whole(1, 2), habits)
         elif acts == "turn":
-            row = draw_turns(dice, start_s, LONGEST_S - 0.4, standing.front_deg, dice.whole(1, 2))
+            row = draw_turns(dice, start_s, LONGEST_S - 0.4, standing.front_deg, dice.whole(1, 2), habits)
         people.append(person_of(body, standing, [action for action in row if _end_s([action]) < LONGEST_S]))
     return people
 
@@ -138,10 +95,10 @@ def duration_of(dice: Dice, people: Sequence[Person]) -> float:
     return round(min(max(end_s, idle_s if end_s < SHORTEST_S else SHORTEST_S), LONGEST_S), 2)
 
 
-def _draw_walk(dice: Dice, plan: Plan, standing: Standing) -> tuple[list[Action], float]:
+def _draw_walk(dice: Dice, plan: Plan, standing: Standing, manner: Manner) -> tuple[list[Action], float]:
     """The way there, if any, and when what follows begins."""
     start_s, speed = dice.between(0.5, 1.1, 2), dice.between(*WALK_PACE_M_S, 2)
-    glances, carries, settle_s = dice.chance(0.5), dice.chance(0.3), dice.between(*SETTLE_S, 2)
+    glances, carries, settle_s = dice.chance(0.5), dice.chance(manner.stands.carries), dice.between(*SETTLE_S, 2)
     if not standing.walks:
         return [], start_s
     begin_s = dice.between(0, 0.4, 2)
@@ -169,27 +126,3 @@ def _carried(dice: Dice, walk: Walk, arrival_s: float) -> list[Action]:
 def _end_s(row: Sequence[Action]) -> float:
     """When the last of these ends; walks do not know."""
     return max([action.end_s for action in row if not isinstance(action, Walk)], default=0.0)
-
-
-def _entrance(dice: Dice, place: Place, bearing_deg: float, fov_deg: float) -> Place:
-    """Where who walks in comes from: from beside the picture, or from farther back in it."""
-    outside, side = dice.chance(0.6), dice.one((-1, 1))
-    away = math.dist(place, CAMERA)
-    far = away + dice.between(0.7, 1.4)
-    edge = side * (fov_deg / 2 + dice.between(6, 12))
-    beside = place_at(CAMERA, edge, away + dice.between(0, 0.4))
-    behind = place_at(CAMERA, bearing_deg * 0.7, far)
-    return beside if outside else behind
-
-
-def _crossing(dice: Dice, fov_deg: float, away_m: float) -> Standing:
-    """Straight through the picture, from one side to the other, parallel to it or nearly."""
-    side, edge = dice.one((-1, 1)), fov_deg / 2 + 10
-    away = max(away_m, 1.6)
-    start = place_at(CAMERA, side * edge, away / math.cos(math.radians(edge)) * dice.between(0.9, 1.05))
-    end = place_at(CAMERA, -side * edge, away / math.cos(math.radians(edge)) * dice.between(0.9, 1.05))
-    return Standing(_rounded(end), round(wrap_deg(heading_to(start, end)), 1), _rounded(start))
-
-
-def _rounded(place: Place) -> Place:
-    return round(place[0], 3), round(place[1], 3)

@@ -14,13 +14,25 @@ from .bearings import place_at
 from .geometry import robot_at, to_world, view_at
 from .scene import Camera, Place, Pointing, Position, Quiet, Waypoint
 
-MARGIN = 0.02
-"""Of the picture's width, on every side."""
 LOWEST_ASPECT = 9 / 16
 CHIN, TOP = 0.87, 1.0
 """Heights of the head's ends, of the body's height."""
 SHOULDER, SHOULDER_SIDE, ARM = 0.81, 0.11, 0.43
 REACH = {"straight": 1.0, "bent": 0.75, "hip": 0.5}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What counts as in the picture: `margin` from every side, of the picture's width, in pictures that are `lowest_aspect` of
+    their width high, and at least `nearest_m` before the lens.
+    """
+
+    lowest_aspect: float = LOWEST_ASPECT
+    margin: float = 0.02
+    nearest_m: float = 0.3
+
+
+ANY_FRAME = Frame()
 
 
 @dataclass(frozen=True)
@@ -61,18 +73,18 @@ def pitch_to(sights: Sequence[Sight], camera_m: Position) -> float:
     return (min(angles) + max(angles)) / 2
 
 
-def fits(sights: Sequence[Sight], camera: Camera, path: Sequence[Waypoint]) -> bool:
-    """Whether all of these are in the picture, whatever its height may be."""
-    height = int(camera.width * LOWEST_ASPECT)
+def fits(sights: Sequence[Sight], camera: Camera, path: Sequence[Waypoint], frame: Frame = ANY_FRAME) -> bool:
+    """Whether all of these are in the picture, whatever its height may be from the frame's on."""
+    height = int(camera.width * frame.lowest_aspect)
     low = camera.model_copy(update={"height": height})
-    margin = MARGIN * camera.width
+    edge = frame.margin * camera.width
     for sight in sights:
         view = view_at(low, robot_at(path, sight.time_s))
         point = to_world(sight.position_m)
-        if view.in_camera(point)[2] < 0.3:
+        if view.in_camera(point)[2] < frame.nearest_m:
             return False
         x, y = view.project(point)
-        if not (margin <= x < low.width - margin and margin <= y < height - margin):
+        if not (edge <= x < low.width - edge and edge <= y < height - edge):
             return False
     return True
 

@@ -18,7 +18,7 @@ from .bearings import heading_to, place_at
 from .dice import Dice
 from .draw_actions import SHORTEST_HOLD_S, Target, draw_pointing
 from .draw_bodies import draw_bodies
-from .draw_scripts import draw_front
+from .draw_stand import draw_front
 from .envelope import envelope_of
 from .geometry import Floats, robot_at, to_world, view_at, wrap_deg
 from .rotations import UP, unit
@@ -63,7 +63,7 @@ def _draw(rng: np.random.Generator, avatars: Sequence[str], seed: int) -> Pointi
     to_camera = heading_to(place, (0.0, 0.0))
     bearing, front = float(rng.uniform(-180, 180)), draw_front(dice)
     target = Target("P", wrap_deg(bearing - front))
-    if not target.reachable:
+    if not target.reachable():
         return None
     # A third of POIs is near: pictures beside the person, objects on a table.
     away = float(np.exp(rng.uniform(*np.log(POI_DISTANCE_M))))

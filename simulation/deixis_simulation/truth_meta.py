@@ -14,7 +14,7 @@ from .pixels import rounded
 from .scene import Scene
 from .truth_camera import camera_truth, labels_origin
 
-DRAWN_NAME = re.compile(r"s(\d+)_(\d+)_[a-z]+")
+DRAWN_NAME = re.compile(r"[ps](\d+)_(\d+)_[a-z]+")
 """Of scenes drawn at random: seed and index."""
 CONVENTIONS = (
     "azimuth/yaw: at the person, from the direction person -> camera, + toward image right (the person's own left). "

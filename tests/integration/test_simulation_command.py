@@ -53,6 +53,15 @@ def test_dry_run_writes_scenes_that_can_be_read(tmp_path):
     assert shown.stdout == (tmp_path / "s0004_000_turn.yaml").read_text()
 
 
+def test_plain_scenes_have_names_of_their_own(tmp_path):
+    done = simulate("--dry-run", "--plain", "--count", 2, "--seed", 4, "--kinds", "turn", "--out", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p0004_000_turn.yaml", "p0004_001_turn.yaml"]
+    wide = simulate("--dry-run", "--plain", "--size", "1280x720")
+    assert wide.returncode == 1
+    assert "4:3" in wide.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

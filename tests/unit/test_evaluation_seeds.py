@@ -44,8 +44,8 @@ class Rendering:
         self.rendered: list[str] = []
         self.stopped = False
 
-    def draw_scene(self, seed: int, index: int, kinds: tuple[str, ...]) -> SimpleNamespace:
-        return SimpleNamespace(name=f"s{seed:04d}_{index:03d}_{kinds[-1]}")
+    def draw_scene(self, seed: int, index: int, kinds: tuple[str, ...], *, plain: bool) -> SimpleNamespace:
+        return SimpleNamespace(name=f"{'p' if plain else 's'}{seed:04d}_{index:03d}_{kinds[-1]}")
 
     def shown_progress(self, _: list[SimpleNamespace]) -> AbstractContextManager[None]:
         return nullcontext()
@@ -82,6 +82,17 @@ def test_clips_of_seeds_are_made_once_and_kept_by_version_and_kinds(rendering: R
     assert "the set 'choosing'" in console.export_text()
 
 
+@pytest.mark.parametrize(("kinds", "folder"), [((), "plain-all"), (("point",), "plain-point")])
+def test_plain_clips_are_kept_apart(rendering: Rendering, kinds: tuple[str, ...], folder: str, tmp_path: Path) -> None:
+    console = Console(file=io.StringIO())
+    usual = choose(Choice(None, "1000:1001", kinds=kinds, cache=tmp_path, jobs=2), console)
+    plain = choose(Choice(None, "1000:1001", kinds=kinds, cache=tmp_path, jobs=2, plain=True), console)
+    assert (usual.plain, plain.plain) == (False, True)
+    assert plain.folder == tmp_path / "9.9" / folder
+    assert len(rendering.rendered) == 2
+    assert [clip.name[0] for clip in (*usual.clips, *plain.clips)] == ["s", "p"]
+
+
 @pytest.mark.usefixtures("rendering")
 def test_clips_of_seeds_are_chosen_by_name_too(tmp_path: Path) -> None:
     chosen = choose(Choice(None, "1000:1002", "*1001*", cache=tmp_path, jobs=2), Console(file=io.StringIO()))
@@ -110,6 +121,7 @@ def test_what_cannot_be_rendered_is_said(rendering: Rendering, tmp_path: Path) -
         (Choice(None, None), "either a folder"),
         (Choice(Path("x"), "1:2"), "either a folder"),
         (Choice(Path("x"), None, kinds=("point",)), "go with --seeds"),
+        (Choice(Path("x"), None, plain=True), "go with --seeds"),
     ],
 )
 def test_a_folder_and_seeds_exclude_each_other(choice: Choice, named: str) -> None:
