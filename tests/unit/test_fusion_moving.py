@@ -11,7 +11,7 @@ import pytest
 from deixis_fusion import weighing
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.evidence import Evidence, Sample, Witness
-from deixis_fusion.frames import Frames
+from deixis_fusion.frames import FrameLog, Frames
 from deixis_fusion.fusion import Fusion
 from deixis_fusion.hand_evidence import hand_over
 from deixis_fusion.head_evidence import head_over
@@ -133,6 +133,22 @@ def sample(frame: int, axis_deg: float, bearing: float, person: Spot = (0.0, 0.0
     pose = HeadPose(person_id=1, status="tracking", yaw_deg=bearing, yaw_sigma_deg=3.0)
     place = PersonPlace((*person, 1.6), camera, 2.0, 0.2)
     return Sample(stamp(frame), stamp(frame), Gesture.model_validate(content | more), pose, place)
+
+
+def test_a_log_that_grows_has_the_same_frames_and_leaves_alone_what_was_taken_from_it() -> None:
+    told = [0.5] * 72
+    samples = [sample(i, 0, i, bearing_likelihood=told if i % 2 else []) for i in range(150)]
+    log = FrameLog(samples[:60])
+    early = Frames.of(log)
+    before = early.table.copy()
+    for one in samples[60:]:
+        log.append(one)
+    late, anew = Frames.of(log), Frames.of(samples)
+    assert (len(early), len(late)) == (60, 150)
+    np.testing.assert_array_equal(early.table, before)
+    np.testing.assert_array_equal(late.table, anew.table)
+    np.testing.assert_array_equal(late.column("bearing_deg"), np.arange(150))
+    np.testing.assert_array_equal(late.curves[:, 7], [0.5 if i % 2 else 0 for i in range(150)])
 
 
 def test_a_ray_stays_where_it_is_in_the_map_while_the_camera_goes_round() -> None:

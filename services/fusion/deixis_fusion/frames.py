@@ -88,7 +88,7 @@ class Frames:
     def of(samples: Sequence[Sample], weights: Values | None = None) -> Frames:
         """These frames, all of weight 1 where none is given."""
         log = samples if isinstance(samples, FrameLog) else FrameLog(samples)
-        return Frames(samples, np.ones(len(samples)) if weights is None else weights, log.table, log.curves)
+        return Frames(log[:], np.ones(len(log)) if weights is None else weights, log.table, log.curves)
 
     def weighed(self, weights: Values) -> Frames:
         """The same frames with these weights."""
