@@ -139,8 +139,10 @@ def frame(seq: int, case: Case) -> JoinedFrame:
     width_px *= 1 + rng.normal(0, 0.02)
     box = {"centroid_px": (x_px, 240), "bbox_px": (x_px - width_px / 2, 210, width_px, 1.3 * width_px)}
     pose = {"person_id": 1, "status": "tracking", "yaw_deg": rng.normal(50, 3), "yaw_sigma_deg": 4.0, "face_width_px": width_px}
+    pose |= {"pitch_deg": rng.normal(-5, 3), "covariance_deg2": (16.0, 0.0, 0.0, 25.0, 0.0, 9.0)}
     stroke = {"phase": "stroke", "gesture": "point_left", "hand": "left", "bearing_deg": rng.normal(60, 8)}
     stroke |= {"bearing_sigma_deg": 12.0, "bearing_likelihood": curve(rng.normal(60, 8))}
+    stroke |= {"elevation_deg": rng.normal(-10, 3), "elevation_sigma_deg": 9.0}
     gesture = {"person_id": 1} | (stroke if case.pointing else {"phase": "idle", "gesture": "none"})
     return JoinedFrame(
         Tracks.model_validate(about | {"stage": "tracker", "width": WIDTH, "height": HEIGHT, "tracks": [face | box]}),

@@ -10,7 +10,7 @@ from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 from .evidence import POINTING, SIDES, HandObservation
 from .frames import Flags, Frames, Values
 from .pointing import PointingGesture
-from .robust import majority, median, median_angle
+from .robust import majority, median, median_and_spread, median_angle
 
 # A finger seen in this part of the frames is seen: at VGA it comes and goes with the outline.
 DIRECTED_SHARE = 0.3
@@ -57,7 +57,7 @@ def _elevation(frames: Frames, own: Flags) -> dict[str, float]:
     if not told.any():
         return {}
     weights = frames.weights[told]
-    elevation, spread = median_angle(frames.column("elevation_deg")[told], weights)
+    elevation, spread = median_and_spread(frames.column("elevation_deg")[told], weights)
     stated = median(frames.column("elevation_sigma_deg")[told], weights)
     return {"elevation_deg": elevation, "elevation_sigma_deg": math.hypot(stated, spread)}
 

@@ -9,7 +9,7 @@ from deixis_schemas.messages import HeadPose
 
 from .evidence import SIDES, STATUSES, HeadObservation
 from .frames import Flags, Frames
-from .robust import majority, median, median_angle
+from .robust import majority, median, median_and_spread, median_angle
 
 LEAST_HEAD_SHARE = 0.2
 
@@ -50,7 +50,7 @@ def _with_pitch(seen: HeadObservation, frames: Frames, tracked: Flags) -> HeadOb
     weights = frames.weights[told]
     if not told.any() or weights.sum() < frames.weights[tracked].sum() / 2:
         return seen
-    pitch, spread = median_angle(frames.column("pitch_deg")[told], weights)
+    pitch, spread = median_and_spread(frames.column("pitch_deg")[told], weights)
     stated = median(frames.column("pitch_sigma_deg")[told], weights)
     return replace(seen, pitch_deg=pitch, pitch_sigma_deg=math.hypot(stated, spread))
 

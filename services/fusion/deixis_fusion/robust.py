@@ -43,6 +43,12 @@ def median_angle(angles_deg: Values, weights: Values) -> tuple[float, float]:
     return wrapped_deg(mean + centre), MAD_TO_SIGMA * spread
 
 
+def median_and_spread(values: Values, weights: Values) -> tuple[float, float]:
+    """Weighted median of values that lie on no circle, and their spread from it as a standard deviation."""
+    centre = median(values, weights)
+    return centre, MAD_TO_SIGMA * median(np.abs(values - centre), weights)
+
+
 def median(values: Values, weights: Values) -> float:
     """Weighted median of these values, one at least."""
     order = values.argsort(kind="stable")
