@@ -264,9 +264,9 @@ def test_report_and_table_hold_every_clip_and_are_plain_json() -> None:
     scores = [scored(truth(), recording(), target(12, 31, "P1"), name="a"), failed_clip("d", truth(), "[router] is gone")]
     summary = summarise(scores)
     slices = [Slice("arm", "bent", 2, 4, {"named": 1, "in_set": 1, "missed": 2, "wrong": 0})]
-    conditions = Conditions(Path("clips"), lockstep=True, truth=("headpose",))
+    conditions = Conditions(Path("clips"), lockstep=True, truth=("headpose",), plain=True)
     content = json.loads(json.dumps(report(conditions, scores, summary, slices, {"cpu": "x"}), allow_nan=False))
-    assert (content["seeds"], content["truth"]) == (None, ["headpose"])
+    assert (content["seeds"], content["plain"], content["truth"]) == (None, True, ["headpose"])
     assert (content["slices"][0]["named_share"], content["slices"][0]["missed"]) == (0.25, 2)
     assert content["summary"]["poi_named_share"] == 0.5
     assert content["clips"]["a"]["episodes"][0]["outcome"] == "named"
