@@ -3,9 +3,9 @@
 usage: python fitting/choose_headpose.py [DIR | --seeds A:B [--plain]] [--looks FILE]
 
 Every head of every clip is read once, look by look (kept in --looks). Then, one after the other:
-* `Calibration`: gain, apart and floor of yaw, pitch, roll, by how likely they make the errors (Student's t with 4 degrees of
-  freedom: a few looks are far off, and a normal distribution would be ruled by them), then scaled so that 68 and 95 % of the
-  errors lie within one and 1.96 sigma as nearly as can be;
+* `Calibration`: gain, apart, floor and turned of yaw, pitch, roll, by how likely they make the errors (Student's t with 4
+  degrees of freedom: a few looks are far off, and a normal distribution would be ruled by them), then scaled so that 68 and
+  95 % of the errors lie within one and 1.96 sigma as nearly as can be;
 * `Motion` and `lasting`: by the mean error of the filtered yaw; then all sigmas are scaled once more, to its coverage.
 The winners are printed as they stand in regressed_head.py and turn_filter.py.
 """
@@ -31,7 +31,7 @@ from deixis_evaluation.tracked_persons import TrackedPersons
 from deixis_evaluation.true_angles import true_angles
 from deixis_headpose.config import HeadposeConfig
 from deixis_headpose.head_reader import HeadReader
-from deixis_headpose.regressed_head import CALIBRATION, Calibration, RegressedHead, angles_of
+from deixis_headpose.regressed_head import CALIBRATION, Calibration, RegressedHead, angles_of, signs_of_error
 from deixis_headpose.regression import Look, Regression
 from deixis_headpose.sight import Sight, centre_of
 from deixis_headpose.turn_filter import Motion
@@ -122,25 +122,25 @@ def _angles(person: TruePerson) -> NDArray[Any]:
 
 
 def choose_calibration(heads: list[list[Reading]]) -> Calibration:
-    """Gain, apart and floor of each angle by likelihood, then scaled to the coverage wanted."""
+    """Gain, apart, floor and turned of each angle by likelihood, then scaled to the coverage wanted."""
     readings = [item for head in heads for item in head if item.look is not None and np.isfinite(item.true_deg).all()]
     looks = [item.look for item in readings if item.look is not None]
     errors = np.array(
         [differences(np.array(angles_of(look)), item.true_deg) for look, item in zip(looks, readings, strict=True)]
     )
-    told = np.degrees([look.sigma for look in looks])
-    between = np.degrees([look.apart for look in looks])
+    signs = np.array([signs_of_error(look) for look in looks])
     chosen = []
     for k, name in enumerate(ANGLES):
-        parts = np.stack([told[:, k], between, np.ones(len(looks))], axis=1) ** 2
-        best = optimize.minimize(_unlikely, np.log([0.8, 0.3, 1.5]), args=(errors[:, k], parts), method="Nelder-Mead")
+        parts = signs[:, :, k]
+        start = np.log([0.8, 0.3, 1.5, 1.5])
+        best = optimize.minimize(_unlikely, start, args=(errors[:, k], parts), method="Nelder-Mead", options={"maxiter": 2000})
         factors = np.exp(best.x)
         factors *= _scale(errors[:, k], np.sqrt(parts @ factors**2))
         factors[2] = max(factors[2], LEAST_FLOOR_DEG)
         chosen.append(factors)
         print(f"{name}: one look, {coverage(errors[:, k], np.sqrt(parts @ factors**2))}")
-    gain, apart, floor = (_rounded(column) for column in zip(*chosen, strict=True))
-    return replace(CALIBRATION, gain=gain, apart=apart, floor_deg=floor)
+    gain, apart, floor, turned = (_rounded(column) for column in zip(*chosen, strict=True))
+    return replace(CALIBRATION, gain=gain, apart=apart, floor_deg=floor, turned_deg=turned)
 
 
 def choose_motion(heads: list[list[Reading]], calibration: Calibration) -> tuple[Calibration, Motion]:
@@ -159,10 +159,8 @@ def choose_motion(heads: list[list[Reading]], calibration: Calibration) -> tuple
 
 
 def _scaled(calibration: Calibration, scale: float) -> Calibration:
-    gain, apart, floor = (
-        _rounded([value * scale for value in values]) for values in (calibration.gain, calibration.apart, calibration.floor_deg)
-    )
-    return replace(calibration, gain=gain, apart=apart, floor_deg=floor)
+    parts = {name: getattr(calibration, name) for name in ("gain", "apart", "floor_deg", "turned_deg")}
+    return replace(calibration, **{name: _rounded([value * scale for value in values]) for name, values in parts.items()})
 
 
 def _rounded(values: Sequence[float]) -> tuple[float, float, float]:
