@@ -159,8 +159,11 @@ def choose_motion(heads: list[list[Reading]], calibration: Calibration) -> tuple
 
 
 def _scaled(calibration: Calibration, scale: float) -> Calibration:
-    parts = {name: getattr(calibration, name) for name in ("gain", "apart", "floor_deg", "turned_deg")}
-    return replace(calibration, **{name: _rounded([value * scale for value in values]) for name, values in parts.items()})
+    gain, apart, floor, turned = (
+        _rounded([value * scale for value in values])
+        for values in (calibration.gain, calibration.apart, calibration.floor_deg, calibration.turned_deg)
+    )
+    return replace(calibration, gain=gain, apart=apart, floor_deg=floor, turned_deg=turned)
 
 
 def _rounded(values: Sequence[float]) -> tuple[float, float, float]:

@@ -48,8 +48,9 @@ def main() -> int:
         check(drawn([(seed, False) for seed in CHECKED_SEEDS]))
         return 0
     arms = drawn([(seed, True) for seed in range(1, 1 + -(-given.arms // PART))])
-    packed = {name: values if name == "left" else values.astype(np.float16) for name, values in arms.items()}
-    np.savez_compressed(given.out, **packed)
+    names = ("bearings_deg", "elevations_deg", "tips", "fists")
+    bearings, elevations, tips, fists = (arms[name].astype(np.float16) for name in names)
+    np.savez_compressed(given.out, bearings_deg=bearings, elevations_deg=elevations, left=arms["left"], tips=tips, fists=fists)
     return 0
 
 

@@ -34,8 +34,9 @@ def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = 
     side = majority(frames.column("hand")[sided], frames.weights[sided])
     hand = None if side is None else SIDES[side]
     told = own & frames.tells("bearing_deg")
+    elevation, high_sigma = _elevation(frames, own)
     if not told.any():
-        return HandObservation(gesture, agreement=agreement, hand=hand, **_elevation(frames, own))
+        return HandObservation(gesture, agreement=agreement, hand=hand, elevation_deg=elevation, elevation_sigma_deg=high_sigma)
     turns_of_all = frames.turns_to(axis_deg)
     weights, turns, seen = frames.weights[told], turns_of_all[told], frames.column("bearing_deg")[told]
     mirrored, mirror = bool(majority(frames.column("mirrored")[told], weights)), None
@@ -47,19 +48,19 @@ def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = 
         mirror = (other, math.hypot(stated, spread_of_other))
     bearing, spread = median_angle(seen + turns, weights)
     curve = _mean_curve(frames, told & frames.tells("has_curve"), turns_of_all) if with_curve else ()
-    sigma, high = math.hypot(stated, spread), _elevation(frames, own)
-    return HandObservation(gesture, bearing, sigma, mirrored, agreement, hand, curve, mirror, **high)
+    sigma = math.hypot(stated, spread)
+    return HandObservation(gesture, bearing, sigma, mirrored, agreement, hand, curve, mirror, elevation, high_sigma)
 
 
-def _elevation(frames: Frames, own: Flags) -> dict[str, float]:
-    """How high these frames point together, by name, where any of them tells."""
+def _elevation(frames: Frames, own: Flags) -> tuple[float | None, float | None]:
+    """How high these frames point together, and its sigma, degrees; none where none of them tells."""
     told = own & frames.tells("elevation_deg")
     if not told.any():
-        return {}
+        return None, None
     weights = frames.weights[told]
     elevation, spread = median_and_spread(frames.column("elevation_deg")[told], weights)
     stated = median(frames.column("elevation_sigma_deg")[told], weights)
-    return {"elevation_deg": elevation, "elevation_sigma_deg": math.hypot(stated, spread)}
+    return elevation, math.hypot(stated, spread)
 
 
 def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, ...]:
