@@ -49,6 +49,8 @@ class HandConfig(StageConfig):
     # with 6 and .15 (as they were before the stage's likelihood itself counted fingers lost) .130; by luck alone it is .13.
     sigma_floor_deg: float = Field(default=4, ge=0, le=90, description="Error of the hand's bearing at least.")
     outlier: float = Field(default=0.05, gt=0, lt=1, description="Probability that the hand's bearing is nonsense.")
+    # Assumed, not fitted: no clip shows who means which of two shelves. The stage's own sigma holds what it says on clips that
+    # it was not made on (`deixis eval --stage gesture`); the tail is for POIs whose height somebody guessed.
     elevation_outlier: float = Field(
         default=0.2, gt=0, le=1, description="Probability that the hand's elevation is nonsense; at 1 it does not count."
     )
