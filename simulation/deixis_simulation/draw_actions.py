@@ -24,6 +24,7 @@ Range = tuple[float, float]
 class Habits:
     """How people point, gesture and look about: ranges from and to, choices by weight, shares. move_s: preparation and
     retraction of a pointing; quiet_move_s: of another gesture. other_arm: not that of the side. turn_s: a look's way there.
+    most_head_gain: what is drawn above it is that, so that a range beyond it has most heads turn so far.
     """
 
     arm_reach_deg: float = ARM_REACH_DEG
@@ -34,6 +35,7 @@ class Habits:
     move_s: Range = (0.35, 0.9)
     shortest_hold_s: float = SHORTEST_HOLD_S
     head_gain: Range = (0.3, 1.05)
+    most_head_gain: float = 1.05
     head_lag_s: Range = (-0.2, 0.3)
     head_overshoot_deg: Range = (0, 5)
     torso_gain: Range = (0.5, 1.4)
@@ -76,7 +78,7 @@ def draw_pointing(dice: Dice, start_s: float, target: Target, longest_hold_s: fl
         hand=dice.weighed(habits.hands),
         looks=("robot" if at_robot else "elsewhere") if looks_away else "poi",
         elsewhere_deg=dice.between(-70, 70, 1),
-        head_gain=dice.between(*habits.head_gain),
+        head_gain=min(dice.between(*habits.head_gain), habits.most_head_gain),
         head_lag_s=dice.between(*habits.head_lag_s, 2),
         head_overshoot_deg=dice.between(*habits.head_overshoot_deg, 1),
         torso_gain=dice.between(*habits.torso_gain, 2),
