@@ -8,6 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 T = TypeVar("T")
+Range = tuple[float, float]
+"""Two numbers that something is drawn by: from and to, or standard deviation and limit."""
 
 
 class Dice:

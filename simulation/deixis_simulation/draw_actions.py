@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from .dice import Dice
+from .dice import Dice, Range
 from .scene import QUIET_GESTURES, Action, ArmSide, ArmStyle, HandShape, HeadTurn, Pointing, Quiet, QuietGesture
 
 ARM_REACH_DEG = 118.0
@@ -17,7 +17,6 @@ LONGEST_HOLD_S = 2.1
 HOLD_IN_A_ROW_S = 1.6
 TURN_REACH_DEG = 135.0
 """How far head and trunk together turn away from the body's front."""
-Range = tuple[float, float]
 
 
 @dataclass(frozen=True)

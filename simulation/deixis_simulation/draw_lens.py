@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .dice import Dice
+from .dice import Dice, Range
 from .scene import Sensor
 
 Size = tuple[int, int]
-Range = tuple[float, float]
 SIZES: dict[Size, float] = {(320, 240): 0.2, (640, 480): 0.45, (960, 540): 0.2, (1280, 720): 0.15}
 """Sizes of the picture that are drawn, by weight."""
 

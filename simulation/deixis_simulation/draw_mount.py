@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .dice import Dice
+from .dice import Dice, Range
 from .framing import ANY_FRAME, Frame, Sight, pitch_to
 from .scene import Camera
 
 PITCH_LIMIT_DEG = 30.0
-Range = tuple[float, float]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .bearings import azimuth_of, heading_to, place_at
-from .dice import Dice
+from .dice import Dice, Range
 from .draw_actions import Target
 from .draw_plan import Plan
 from .geometry import wrap_deg
 from .scene import Place, ScenePoi
 
 CAMERA: Place = (0.0, 0.0)
-Range = tuple[float, float]
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,21 @@ def test_a_pose_that_tracks_needs_its_sigma():
         codec.validate(m.HeadPose, {"person_id": 0, "status": "tracking", "yaw_deg": 3.0})
 
 
+@pytest.mark.parametrize("angle", ["bearing", "elevation"])
+def test_an_angle_of_a_gesture_and_its_sigma_come_together(angle):
+    stroke = {"person_id": 0, "phase": "stroke", "gesture": "point_left"}
+    for name in ("deg", "sigma_deg"):
+        with pytest.raises(codec.Malformed, match=f"{angle}_sigma_deg: .* come together"):
+            codec.validate(m.Gesture, stroke | {f"{angle}_{name}": 3.0})
+    codec.validate(m.Gesture, stroke | {f"{angle}_deg": 3.0, f"{angle}_sigma_deg": 3.0})
+
+
+def test_a_gesture_points_no_higher_than_straight_up():
+    stroke = {"person_id": 0, "phase": "stroke", "gesture": "point_left", "elevation_sigma_deg": 3.0}
+    with pytest.raises(codec.Malformed, match="elevation_deg"):
+        codec.validate(m.Gesture, stroke | {"elevation_deg": 90.1})
+
+
 HEAD = {"person_id": 0, "status": "tracking", "yaw_deg": 3.0, "yaw_sigma_deg": 2.0, "pitch_deg": 1.0, "roll_deg": 0.0}
 
 

@@ -58,6 +58,10 @@ def _said(frames, gesture="point_left", bearing=60.0, phase="stroke", **more):
     return recording
 
 
+def _scored(recording, **truth):
+    return score_gestures("clip", _truth(**truth), recording, {7: 0})
+
+
 def test_an_elevation_is_off_from_that_of_the_poi_at_the_head():
     """The POI is at (1, 1, 1); a head 2 m before the camera and level with it has it 1 m up and sqrt(1 + 9) m away."""
     said = _said(range(23, 52), elevation_deg=20.0, elevation_sigma_deg=9.0)
@@ -66,10 +70,6 @@ def test_an_elevation_is_off_from_that_of_the_poi_at_the_head():
     assert stroke.elevation_sigma_deg == 9.0
     assert _scored(said).strokes[0].elevation_off_deg is None
     assert summarise_gestures([_scored(said, head_m=(0.0, 0.0, 2.0))]).elevation_within_1.share == 1.0
-
-
-def _scored(recording, **truth):
-    return score_gestures("clip", _truth(**truth), recording, {7: 0})
 
 
 def test_a_stroke_that_is_said_is_recognised_with_side_bearing_and_times():

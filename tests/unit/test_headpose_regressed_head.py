@@ -139,6 +139,13 @@ def test_the_variances_are_those_of_the_message() -> None:
     assert message.yaw_sigma_deg == pytest.approx(message.covariance_deg2[0] ** 0.5)
 
 
+def test_a_head_that_is_turned_is_less_sure_than_the_network_says() -> None:
+    """Its yaw in profile by more than from the front, with the same look otherwise; a yaw beyond 90 as one before it."""
+    front, aside, behind = (CALIBRATION.variances(a_look(yaw))[1][0] for yaw in (0.0, 60.0, 120.0))
+    assert aside > 2 * front
+    assert behind == pytest.approx(aside)
+
+
 def test_many_looks_at_a_resting_head_do_not_make_it_surer_than_its_face_allows() -> None:
     _, lasting = CALIBRATION.variances(a_look(20))
     state = followed([a_look(20)] * 200)[-1]

@@ -47,7 +47,7 @@ class HandConfig(StageConfig):
     discount: float = Field(default=0.08, ge=0, le=1, description="Mass kept on the whole frame.")
     # These two by `deixis eval --stage fusion --seeds 0:20 --kinds point --set fusion.hand.NAME=VALUE`: calibration error .099,
     # with 6 and .15 (as they were before the stage's likelihood itself counted fingers lost) .130; by luck alone it is .13.
-    sigma_floor_deg: float = Field(default=4, ge=0, le=90, description="Error of the hand's bearing at least.")
+    sigma_floor_deg: float = Field(default=4, ge=0, le=90, description="Error of the hand's bearing and elevation at least.")
     outlier: float = Field(default=0.05, gt=0, lt=1, description="Probability that the hand's bearing is nonsense.")
     # Assumed, not fitted: no clip shows who means which of two shelves. The stage's own sigma holds what it says on clips that
     # it was not made on (`deixis eval --stage gesture`); the tail is for POIs whose height somebody guessed.
