@@ -19,7 +19,7 @@ from .dice import Dice
 from .draw_bodies import draw_bodies
 from .geometry import Floats, View
 from .mixed_heads import mixed_head, reduced
-from .portrait_arms import camera_bearing, direction_of, raised_arm
+from .portrait_arms import camera_bearing, camera_elevation_deg, direction_of, raised_arm
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
 from .rotations import about, unit
@@ -32,7 +32,7 @@ from .truth_head import MIRROR
 SIDE_PX, SIDE_M = 96, 0.5
 """A portrait is a square of so many pixels and, at the head's distance, about so many metres."""
 ROOMS = 24
-VIEWS = 16
+VIEWS = 10
 """Portraits of one person in one light: posing and shadows cost more than a look."""
 BUST_M = 0.4
 """So far below the base of the head a person is drawn."""
@@ -173,7 +173,7 @@ def _view(rng: np.random.Generator, skeleton: Skeleton, posture: Posture, hand: 
     `hand`: bearing of a raised one, which often comes between.
     """
     yaw = float(rng.uniform(-135, 135) if rng.random() < 0.8 else rng.uniform(-180, 180))
-    bearing = np.array([posture.head[0] - yaw, float(np.clip(rng.normal(3, 11), -30, 40))])
+    bearing = np.array([posture.head[0] - yaw, camera_elevation_deg(rng)])
     if hand is not None and rng.random() < _BEFORE:
         bearing = camera_bearing(rng, hand)
     roll = float(np.clip(rng.normal(0, 6), -20, 20))

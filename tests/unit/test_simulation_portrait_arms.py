@@ -2,7 +2,7 @@ import numpy as np
 from deixis_simulation.arms import hanging_arm
 from deixis_simulation.avatars import FITTING_AVATARS, load_avatar
 from deixis_simulation.body import fit_body
-from deixis_simulation.portrait_arms import AROUND_DEG, camera_bearing, direction_of, raised_arm
+from deixis_simulation.portrait_arms import AROUND_DEG, camera_bearing, camera_elevation_deg, direction_of, raised_arm
 from deixis_simulation.skeleton import SIDES, Posture, Skeleton, solve
 
 BODY = fit_body(load_avatar(FITTING_AVATARS[1]), 1.7)
@@ -45,3 +45,11 @@ def test_a_camera_that_shall_see_the_hand_at_the_face_stands_about_where_it_poin
 def test_a_bearing_is_positive_to_the_persons_left_and_up() -> None:
     assert np.allclose(direction_of(np.array([90.0, 0.0])), (1, 0, 0), atol=1e-9)
     assert direction_of(np.array([0.0, 30.0]))[1] > 0.4
+
+
+def test_cameras_look_up_at_heads_more_often_than_down() -> None:
+    rng = np.random.default_rng(0)
+    elevations = np.array([camera_elevation_deg(rng) for _ in range(4000)])
+    below, above = np.mean(elevations < -25), np.mean(elevations > 25)
+    assert below > above > 0.04
+    assert np.abs(elevations).max() <= 40
