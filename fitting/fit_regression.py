@@ -40,7 +40,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--portraits", type=int, default=20000, help="of fitting people (default: 20000)")
     parser.add_argument("--minutes", type=float, default=60.0, help="of training (default: 60)")
-    parser.add_argument("--cache", type=Path, default=CACHE, help="folder of rendered portraits and checkpoints")
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        default=CACHE,
+        help="folder of rendered portraits and checkpoints; remove it after a change of portraits",
+    )
     parser.add_argument("--from", type=Path, dest="start", help="checkpoint (.pt) or weights (.npz) to go on from")
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="file of weights to write")
     given = parser.parse_args()

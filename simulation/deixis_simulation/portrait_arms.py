@@ -1,4 +1,4 @@
-"""Where cameras of portraits stand; arms before the face as one sees them that is pointed at or past: rendered, with shadows.
+"""Arms before the face, as a camera sees them that is pointed at or past: rendered, with their shadows.
 
 Painted arms were not enough: with a real forearm and fist across the mouth a face at -14 degrees was read as 45.
 """
@@ -17,11 +17,8 @@ from .skeleton import SIDES
 
 HAND_FROM_HEAD_M = (0.16, 0.5)
 """How far before the head the wrist is."""
-AROUND_DEG, UP_DEG, SPREAD_DEG = 110.0, (-8.0, 18.0), 12.0
-"""The wrist's bearing from the head: at most so far around, elevation (mean, deviation); how cameras spread about it."""
-ODD_HEIGHTS, ELEVATIONS_DEG = 0.4, (-40.0, 40.0)
-"""Share of cameras from any elevation above the head, and what elevations there are: a face 27 degrees above a robot's camera,
-of which there were next to no portraits, was read 32 degrees aside."""
+AROUND_DEG, UP_DEG = 110.0, (-8.0, 18.0)
+"""The wrist's bearing from the head: at most so far around, elevation (mean, deviation)."""
 SHAPES = (REST, INDEX, INDEX, OPEN, FLAT, FIST)
 
 
@@ -38,18 +35,6 @@ def raised_arm(rng: np.random.Generator, body: Body) -> tuple[ArmSide, Arm, Floa
     shape = SHAPES[int(rng.integers(len(SHAPES)))]
     arm = arm_to_wrist(body, side, np.eye(3), shoulder, wrist, elbow, hand, shape, pronation_deg=float(rng.uniform(-60, 90)))
     return side, arm, bearing
-
-
-def camera_bearing(rng: np.random.Generator, bearing_deg: Floats) -> Floats:
-    """Azimuth and elevation (2,) of a camera, degrees, that has the hand before the face or near it."""
-    return bearing_deg + rng.normal(0, SPREAD_DEG, 2)
-
-
-def camera_elevation_deg(rng: np.random.Generator) -> float:
-    """How far a camera is above a head: a robot's is lower than grown people's, and looks up the more the nearer they come."""
-    if rng.random() < ODD_HEIGHTS:
-        return float(rng.uniform(*ELEVATIONS_DEG))
-    return float(np.clip(rng.normal(-3, 11), *ELEVATIONS_DEG))
 
 
 def direction_of(bearing_deg: Floats) -> Floats:

@@ -19,7 +19,8 @@ from .dice import Dice
 from .draw_bodies import draw_bodies
 from .geometry import Floats, View
 from .mixed_heads import mixed_head, reduced
-from .portrait_arms import camera_bearing, camera_elevation_deg, direction_of, raised_arm
+from .portrait_arms import direction_of, raised_arm
+from .portrait_cameras import camera_bearing, camera_elevation_deg
 from .portrait_props import with_glasses, with_something_before
 from .renderer import FloatPicture, Renderer, Tints, over
 from .rotations import about, unit
