@@ -1,7 +1,7 @@
 """Hands of real and of rendered people: how much skin is told from the rest, and whether a single finger is seen as one.
 
 Skin is judged by the prior alone, for pictures of hands hold no face to adapt to. Fingers are counted on the true outline of
-the hand where there is one (hgr1, rendered clips), else on what is skin-coloured in the labelled box (hands).
+the hand where there is one (hgr1, rendered clips), else on what differs from the colours around the labelled box (hands).
 """
 
 from __future__ import annotations
@@ -33,8 +33,11 @@ T = TypeVar("T")
 PALM_RADIUS = 0.25
 # A lone hand stands upright above the chest.
 RAISED = (0.0, -1.5)
-HGR_SIGNS = {"Z": 1, "D": 1, "2": 2, "3": 3, "4": 4, "5": 5}
-"""Fingers extended in those signs of hgr1 of which it is known."""
+HGR_INDEX_ALONE = ("Z", "D")
+"""Signs of hgr1 that extend the index finger alone. All others count as other hands: of the digits 2 to 5 alone, as it was
+counted once, none is taken for an index; of all signs a third are."""
+CUT_ROUNDS, CUT_MARGIN, CUT_SIDE_PX = 4, 0.4, 160
+"""A boxed hand is cut out (GrabCut) in so many rounds, with so much around its box, sides, in a picture of so many pixels."""
 OPEN_HANDS = ("wave", "stop")
 EVERY = 10
 """Of a rendered clip every so many frames are looked at."""
@@ -62,9 +65,9 @@ class Hands:
         self.background += int(background.sum())
         self.background_taken += int((called & background).sum())
 
-    def count_fingers(self, extended: int, found: int) -> None:
-        """One hand with so many fingers extended, and how many were found."""
-        if extended == 1:
+    def count_fingers(self, *, alone: bool, found: int) -> None:
+        """One hand, whether it extends the index finger alone, and how many fingers were found."""
+        if alone:
             self.single += 1
             self.single_seen += found == 1
         else:
@@ -81,6 +84,7 @@ class Hands:
             "one_finger_seen_share": _share(self.single_seen, self.single),
             "other_hands": float(self.others),
             "others_seen_as_one_finger_share": _share(self.others_as_single, self.others),
+            "one_finger_precision": _share(self.single_seen, self.single_seen + self.others_as_single),
         }
 
 
@@ -93,9 +97,8 @@ def hgr1(folder: Path, sample: int) -> Hands:
             raise ValueError(f"'{path}' and its picture do not belong together")
         hands.pictures += 1
         hands.count_skin(called_skin(np.asarray(picture, np.uint8)), truth > 127, truth <= 127)
-        extended = HGR_SIGNS.get(path.name.split("_", 1)[0])
-        if extended is not None:
-            hands.count_fingers(extended, fingers_of(np.asarray(truth > 127, np.uint8), RAISED))
+        alone = path.name.split("_", 1)[0] in HGR_INDEX_ALONE
+        hands.count_fingers(alone=alone, found=fingers_of(np.asarray(truth > 127, np.uint8), RAISED))
     return hands
 
 
@@ -107,10 +110,32 @@ def boxed(folder: Path, sample: int) -> Hands:
         if picture is None:
             raise ValueError(f"'{path}' has no picture")
         hands.pictures += 1
-        called = called_skin(np.asarray(picture, np.uint8))
-        for extended, (x0, y0, x1, y1) in _boxes(path):
-            hands.count_fingers(extended, fingers_of(np.asarray(called[y0:y1, x0:x1], np.uint8), RAISED))
+        for extended, box in _boxes(path):
+            found = fingers_of(cut_out(np.asarray(picture, np.uint8), box), RAISED)
+            hands.count_fingers(alone=extended == 1, found=found)
     return hands
+
+
+def cut_out(picture: Picture, box: tuple[int, int, int, int]) -> Mask:
+    """What stands out in a box (left, top, right, bottom) against the colours around it, 0 or 1.
+
+    The skin prior alone left wall and door in the box, and so judged the finding of fingers on what no hand is.
+    """
+    (x0, y0, x1, y1), (height, width) = box, picture.shape[:2]
+    margin = round(CUT_MARGIN * max(x1 - x0, y1 - y0))
+    left, top = max(0, x0 - margin), max(0, y0 - margin)
+    around = picture[top : min(height, y1 + margin), left : min(width, x1 + margin)]
+    share = min(1.0, CUT_SIDE_PX / max(around.shape[:2]))
+    small = np.asarray(cv2.resize(around, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), np.uint8)
+    mask = np.full(small.shape[:2], cv2.GC_BGD, np.uint8)
+    inside = tuple(slice(round((a - o) * share), round((b - o) * share)) for a, b, o in ((y0, y1, top), (x0, x1, left)))
+    mask[inside] = cv2.GC_PR_FGD
+    if (mask == cv2.GC_BGD).sum() < 2 or (mask == cv2.GC_PR_FGD).sum() < 2:
+        return np.zeros(small.shape[:2], np.uint8)
+    cv2.setRNGSeed(0)  # GrabCut draws its first clusters by chance
+    models = np.zeros((1, 65)), np.zeros((1, 65))
+    cv2.grabCut(small, mask, (0, 0, 0, 0), *models, CUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+    return np.asarray((mask == cv2.GC_FGD) | (mask == cv2.GC_PR_FGD), np.uint8)
 
 
 def rendered(clips: Sequence[Clip]) -> Hands:
@@ -136,7 +161,7 @@ def _count_rendered(hands: Hands, picture: Picture, parts: Mask, persons: Sequen
             continue
         own = np.asarray((part == PARTS[side]) & (parts >> PERSON_SHIFT == person.id), np.uint8)
         if own.any():
-            hands.count_fingers(1 if person.points else 5, fingers_of(own, _place(person, own)))
+            hands.count_fingers(alone=person.points, found=fingers_of(own, _place(person, own)))
 
 
 def sampled(items: Sequence[T], sample: int) -> list[T]:

@@ -46,14 +46,36 @@ def test_items_are_sampled_evenly() -> None:
     assert sampled([], 5) == []
 
 
-def hands(folder: Path) -> None:
-    """One picture of hgr1, a sign with the index finger alone."""
-    folder.mkdir(parents=True)
+def test_a_little_finger_alone_counts_as_another_hand_that_was_taken_for_an_index(tmp_path: Path) -> None:
+    from real_hands import hgr1
+
+    hands(tmp_path, "Z")
+    hands(tmp_path, "I")
+    assert hgr1(tmp_path, 10).figures()["one_finger_precision"] == 0.5
+
+
+def test_a_boxed_hand_is_cut_out_whatever_the_colour_of_the_wall() -> None:
+    from real_hands import RAISED, cut_out, fingers_of
+
+    mask = hand(1)
+    for wall in ((90, 90, 90), (90, 140, 200)):  # the second is of the colour of skin to the prior
+        picture = np.full((*mask.shape, 3), wall, np.uint8)
+        picture[mask > 0] = SKIN
+        picture = np.clip(picture + np.random.default_rng(1).normal(0, 4, picture.shape), 0, 255).astype(np.uint8)
+        rows, columns = np.nonzero(mask)
+        box = int(columns.min()) - 4, int(rows.min()) - 4, int(columns.max()) + 4, int(rows.max()) + 4
+        assert fingers_of(cut_out(picture, box), RAISED) == 1
+    assert not cut_out(np.zeros((20, 20, 3), np.uint8), (0, 0, 20, 20)).any()
+
+
+def hands(folder: Path, sign: str = "Z") -> None:
+    """One picture of hgr1, of a sign; with the index finger alone by default."""
+    folder.mkdir(parents=True, exist_ok=True)
     mask = hand(1)
     picture = np.full((*mask.shape, 3), 90, np.uint8)
     picture[mask > 0] = SKIN
-    cv2.imwrite(str(folder / "Z_P_hgr1_id01_1.jpg"), picture)
-    cv2.imwrite(str(folder / "Z_P_hgr1_id01_1.mask.png"), 255 * mask)
+    cv2.imwrite(str(folder / f"{sign}_P_hgr1_id01_1.jpg"), picture)
+    cv2.imwrite(str(folder / f"{sign}_P_hgr1_id01_1.mask.png"), 255 * mask)
 
 
 def test_what_is_not_there_is_left_out_and_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
