@@ -104,7 +104,7 @@ class FusionService:
         if edits:
             refused = self._edits.take(edits, self._node.now_ns())
             if refused:
-                self._node.warn("edit", f"{len(refused)} of {len(edits)} edits refused: {refused[0]}")
+                self._node.warn("edit", f"{len(refused)} of {len(edits)} POI edits refused, the first {refused[0]}")
             self._after_edits()
         lost = self._poi_edits.lost
         self._count_to("edits_lost", lost)
@@ -152,6 +152,7 @@ class FusionService:
         return [
             Reading(
                 stage=stage,
+                key=subscription.key,
                 alive=stage in alive,
                 received=subscription.received,
                 rejected=subscription.rejected,
