@@ -135,7 +135,10 @@ class FusionService:
     def _hear_camera(self, info: CameraInfo, now_s: float) -> None:
         lacking = self._fusion.set_camera(info)
         self._end.hear(info, now_s)
-        unplaced = f"persons cannot be placed: {lacking}" if lacking and info.state == "streaming" else None
+        if lacking and info.camera_matrix is not None:
+            self._node.count("lenses_refused")
+            self._node.warn("lens", f"{self._camera.key}: not used: {info.stage}/{info.instance}: {lacking}")
+        unplaced = f"persons cannot be placed: {self._camera.key}: {lacking}" if lacking and info.state == "streaming" else None
         self._node.note("intrinsics", unplaced)
 
     def _place_robot(self) -> None:
