@@ -9,6 +9,7 @@ import json
 import math
 import os
 import sys
+import time
 from collections import defaultdict
 
 import numpy as np
@@ -57,18 +58,34 @@ def read(topic, sample):
         return None
 
 
+def open_session(endpoint, within_s):
+    """A client session of the router at `endpoint`, which may still be starting; ends the process where none comes in time."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    until_s, told = time.monotonic() + within_s, False
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError:
+            if time.monotonic() > until_s:
+                sys.exit(f"swap_headpose: no Zenoh router answers at {endpoint} (--connect); start 'deixis run' or 'deixis up'")
+        if not told:
+            print(f"swap_headpose: waiting {within_s:g} s for a router at {endpoint}", file=sys.stderr, flush=True)
+            told = True
+        time.sleep(0.2)  # and not Zenoh's own `connect/timeout_ms`: while that waits, Ctrl-C goes unheard
+
+
 def main():
     """Publish head poses until told to stop."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robot", required=True)
     parser.add_argument("--connect", default="tcp/127.0.0.1:7447", metavar="ENDPOINT", help="default: %(default)s")
+    parser.add_argument("--wait", type=float, default=20.0, metavar="S", help="for the router to come (default: %(default)s)")
     given = parser.parse_args()
     producer = Producer("headpose", f"swap-{os.getpid()}")
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([given.connect]))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
+    with open_session(given.connect, given.wait) as session:
         # Rings keep the newest: whoever is slow works on what is new and never on a backlog.
         frames = session.declare_subscriber(topics.FRAME.key(given.robot), zenoh.handlers.RingChannel(8))
         tracks = session.declare_subscriber(topics.TRACKS.key(given.robot), zenoh.handlers.RingChannel(1))
@@ -97,4 +114,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)

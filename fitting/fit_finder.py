@@ -21,6 +21,7 @@ import numpy as np
 from figure_files import CACHE, PART, Figures, render
 from fit_windows import Windows, windows_of
 from numpy.typing import NDArray
+from parent_watch import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[1]
 WEIGHTS = ROOT / "services/tracker/deixis_tracker/finder.onnx"
@@ -97,6 +98,7 @@ class WindowMaker:
 
 
 def _make(paths: list[Path], queue: Any) -> None:
+    end_with_parent()
     cv2.setNumThreads(1)
     rng, figures = np.random.default_rng(), Figures.load(paths)
     while True:

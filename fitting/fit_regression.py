@@ -24,6 +24,7 @@ import cv2
 import numpy as np
 from fit_crops import Crops, Portraits, crops_of
 from numpy.typing import NDArray
+from parent_watch import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[1]
 WEIGHTS = ROOT / "services/headpose/deixis_headpose/regression.npz"
@@ -80,7 +81,7 @@ def render(cache: Path, seeds: list[int], count: int) -> list[Path]:
     """Files of portraits, one a seed; those that are there already are kept."""
     paths = [cache / f"portraits_{seed}_{count}.npz" for seed in seeds]
     missing = [(path, seed, count) for path, seed in zip(paths, seeds, strict=True) if not path.exists()]
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
         for path in pool.map(_render, missing):
             print(f"{path.name} is rendered", flush=True)
     return paths
@@ -123,6 +124,7 @@ class CropMaker:
 
 
 def _make(paths: list[Path], queue: Any) -> None:
+    end_with_parent()
     cv2.setNumThreads(1)
     rng, portraits = np.random.default_rng(), Portraits.load(paths)
     while True:

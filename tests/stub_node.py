@@ -1,5 +1,6 @@
 """A node without a session: for tests of a stage's shell alone."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -10,7 +11,8 @@ from deixis_schemas.topics import Topic
 class Inbox:
     """What a subscription holds."""
 
-    def __init__(self) -> None:
+    def __init__(self, key: str) -> None:
+        self.key = key
         self.messages: list[Message] = []
 
     def take_all(self) -> list[Message]:
@@ -24,20 +26,22 @@ class Inbox:
 class StubNode:
     """Hands the stage the messages of one turn of its loop after the other, and keeps what it says.
 
-    `published` are its messages, `notes` those of its health at the end of each turn.
+    `published` are its messages, `notes` those of its health at the end of each turn, `warnings` and `counters` all of them.
     """
 
     def __init__(self, stage: str, turns: Sequence[Sequence[Message]]) -> None:
         self.producer = Producer(stage, "stub")
         self.published: list[Message] = []
         self.notes: list[dict[str, str]] = []
+        self.warnings: list[str] = []
+        self.counters: Counter[str] = Counter()
         self._turns = iter(turns)
         self._first = True
         self._now: dict[str, str] = {}
         self._inboxes: dict[type[Message], Inbox] = {}
 
     def subscribe(self, topic: Topic, **_bounds: int) -> Inbox:
-        return self._inboxes.setdefault(topic.type, Inbox())
+        return self._inboxes.setdefault(topic.type, Inbox(topic.key("r1")))
 
     def publish(self, _topic: Topic) -> "StubNode":
         return self
@@ -57,6 +61,12 @@ class StubNode:
     @contextmanager
     def step(self) -> Iterator[None]:
         yield
+
+    def count(self, name: str) -> None:
+        self.counters[name] += 1
+
+    def warn(self, _kind: str, text: str) -> None:
+        self.warnings.append(text)
 
     def note(self, key: str, text: str | None) -> None:
         self._now.pop(key, None)

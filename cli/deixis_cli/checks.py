@@ -10,7 +10,7 @@ from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, State
 from deixis_schemas.topics import By
 
-from .system import StageProcess, System
+from .system import HEARD_ONLY, StageProcess, System
 
 Level = Literal["ok", "note", "wrong"]
 
@@ -55,7 +55,7 @@ def findings(system: System, listening: Listening) -> list[Finding]:
 
 def missing_stages(system: System) -> Iterator[Finding]:
     """Stages of the contract that nobody runs. An output that is heard all the same comes from a stand-in."""
-    heard = {producer.split("/")[0] for producer in heard_producers(system)}
+    heard = {producer.split("/")[0] for producer in system.heard()}
     for stage in system.missing():
         if stage in heard:
             yield Finding("note", f"{stage}: not one of the runtime's stages, but its messages are heard")
@@ -63,26 +63,20 @@ def missing_stages(system: System) -> Iterator[Finding]:
             yield Finding("wrong", f"{stage}: no process of it is alive", f"start it: deixis up --only {stage} ...")
 
 
-def heard_producers(system: System) -> set[str]:
-    """`stage/instance` of all whose messages the stages have heard lately."""
-    return {producer for p in system.processes if p.health for i in p.health.inputs for producer in i.producers}
-
-
 def hung_stages(system: System) -> Iterator[Finding]:
     """Processes with a token that answer nothing, or answer without a token. A guest that is heard need not give health."""
-    heard = heard_producers(system)
     for process in system.processes:
-        name = f"{process.stage}/{process.instance}"
-        if process.standing == "hung" and name in heard:
-            yield Finding("note", f"{name}: its messages are heard, but it answers no get of its health")
-        elif process.standing == "hung":
+        standing = system.standing(process)
+        if standing == "heard":
+            yield Finding("note", f"{process.name}: {HEARD_ONLY}")
+        elif standing == "hung":
             yield Finding(
                 "wrong",
-                f"{name}: alive but gives no answer",
+                f"{process.name}: alive but gives no answer",
                 "it hangs or is stopped (SIGSTOP): restart it; or access control denies gets on its health key",
             )
-        elif process.standing == "no token":
-            yield Finding("note", f"{name}: answers but holds no liveliness token")
+        elif standing == "no token":
+            yield Finding("note", f"{process.name}: answers but holds no liveliness token")
 
 
 def ill_stages(system: System) -> Iterator[Finding]:

@@ -14,11 +14,12 @@ from rich.table import Table
 from rich.text import Text
 
 from .options import add_connect, add_json, add_robot
-from .system import StageProcess, System, look
+from .system import HEARD_ONLY, StageProcess, Standing, System, look
 
 CPU_OVER_S = 0.5
 PLAIN_WIDTH = 180
-STYLES = {"ok": "green", "degraded": "yellow"}
+STYLES = {"ok": "green", "heard": "green", "degraded": "yellow"}
+UNANSWERED = {"heard": HEARD_ONLY, "hung": "its process is alive but gives no answer: hung or stopped"}
 
 
 def register(subparsers: Any) -> None:
@@ -53,7 +54,7 @@ def document(system: System, endpoint: str) -> dict[str, Any]:
             {
                 "stage": process.stage,
                 "instance": process.instance,
-                "state": process.standing,
+                "state": system.standing(process),
                 "alive": process.alive,
                 "cpu_percent": None if process.cpu_percent is None else round(process.cpu_percent, 1),
                 "health": process.health.model_dump(mode="json") if process.health else None,
@@ -76,7 +77,7 @@ def print_system(system: System) -> None:
     for name in ("STAGE", "STATE", "PROCESS", "HOST", "UP", "CPU", "MB", "STEP", "OUT", "IN (rate, age, dropped, refused)"):
         table.add_column(name)
     for process in system.processes:
-        table.add_row(*_row(process))
+        table.add_row(*_row(process, system.standing(process)))
     console.print(table)
     for line in remarks(system):
         console.print(Text(line))
@@ -87,7 +88,7 @@ def remarks(system: System) -> list[str]:
     lines = [f"{stage}: not there" for stage in system.missing()]
     for process in system.processes:
         if process.health is None:
-            lines.append(f"{process.stage}: its process is alive but gives no answer: hung or stopped")
+            lines.append(f"{process.stage}: {UNANSWERED[system.standing(process)]}")
             continue
         if process.health.state != "ok":
             lines.append(f"{process.stage}: {process.health.state}: {process.health.reason}")
@@ -101,9 +102,9 @@ def remarks(system: System) -> list[str]:
     return lines + system.doubled()
 
 
-def _row(process: StageProcess) -> list[Text]:
+def _row(process: StageProcess, standing: Standing) -> list[Text]:
     health = process.health
-    state = Text(process.standing, style=STYLES.get(process.standing, "red"))
+    state = Text(standing, style=STYLES.get(standing, "red"))
     head = [Text(process.stage), state, Text(process.instance)]
     if health is None:
         return [*head, *(Text("-") for _ in range(7))]

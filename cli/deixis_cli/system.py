@@ -14,7 +14,8 @@ from .gets import get_all, get_healths, get_state
 
 TOKENS_TIMEOUT_S = 2.0
 
-Standing = Literal["ok", "degraded", "failed", "hung", "no token"]
+Standing = Literal["ok", "degraded", "failed", "heard", "hung", "no token"]
+HEARD_ONLY = "its messages are heard, but it answers no get of its health"
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,9 @@ class StageProcess:
     clock_ahead_s: float | None = None
 
     @property
-    def standing(self) -> Standing:
-        """What the stage says, or that it says nothing (`hung`), or that it has no token (not one of the runtime's)."""
-        if self.health is None:
-            return "hung"
-        return self.health.state if self.alive else "no token"
+    def name(self) -> str:
+        """As messages name their producer: `stage/instance`."""
+        return f"{self.stage}/{self.instance}"
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,19 @@ class System:
     camera: CameraInfo | None = None
     state: State | None = None
 
+    def heard(self) -> set[str]:
+        """`stage/instance` of all whose messages the stages have heard lately."""
+        return {producer for p in self.processes if p.health for i in p.health.inputs for producer in i.producers}
+
+    def standing(self, process: StageProcess) -> Standing:
+        """What the stage says, or that it says nothing (`hung`), or that it has no token (not one of the runtime's).
+
+        A stage of one's own need not give health: while its messages come it is `heard`.
+        """
+        if process.health is None:
+            return "heard" if process.name in self.heard() else "hung"
+        return process.health.state if process.alive else "no token"
+
     def missing(self) -> list[str]:
         """Stages of the contract without a process."""
         present = {process.stage for process in self.processes}
@@ -54,7 +66,7 @@ class System:
         """Keys with more than one producer, as sentences."""
         found: dict[str, set[str]] = {}
         for process in self.processes:
-            found.setdefault(f"stage {process.stage}", set()).add(f"{process.stage}/{process.instance}")
+            found.setdefault(f"stage {process.stage}", set()).add(process.name)
             for item in process.health.inputs if process.health else []:
                 found.setdefault(f"key {item.key}", set()).update(item.producers)
         return [f"{what} has {len(who)} producers: {', '.join(sorted(who))}" for what, who in found.items() if len(who) > 1]

@@ -16,9 +16,16 @@ Point = tuple[float, float]
 Size = tuple[int, int]
 Row = tuple[float, float, float]
 Square = tuple[Row, Row, Row]
+Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 UNDISTORT_STEPS = 20
-FOCAL_LIMITS_PX = (1.0, 1e6)
+FIELD_LIMITS_DEG = (5.0, 170.0)
+"""Width of view by fx. Below, a face 5 m away is 40 % of the picture wide and no arm fits in; above, an angle at the rim takes
+over 130 times the pixels that it takes in the middle. A fisheye of 180 degrees has 115 by this measure."""
+PIXEL_LIMITS = (0.4, 2.5)
+"""fx by fy: pixels are square, or as in half frames of video up to twice as wide or high."""
+ASPECT_TOLERANCE = 0.02
+"""Scaling to whole pixels changes the ratio of a small picture by about 1 %."""
 
 
 class LensError(ValueError):
@@ -49,11 +56,10 @@ class Lens:
     @staticmethod
     def of(info: CameraInfo) -> Lens:
         """The lens that the camera tells of. Raises LensError where it has no intrinsics yet, or none that can be."""
-        if info.camera_matrix is None or not (info.width and info.height):
+        if info.camera_matrix is None:
             raise LensError("camera_matrix: the camera has no intrinsics yet")
+        check_matrix(info.camera_matrix, info.width, info.height)
         fx, _, cx, _, fy, cy, *_ = info.camera_matrix
-        if not all(FOCAL_LIMITS_PX[0] <= focal <= FOCAL_LIMITS_PX[1] for focal in (fx, fy)):
-            raise LensError(f"camera_matrix: focal lengths of {fx:.3g} and {fy:.3g} pixels")
         model = info.distortion_model if any(info.distortion) else "none"
         return Lens(info.width, info.height, (fx, fy, cx, cy), model, tuple(info.distortion))
 
@@ -62,6 +68,10 @@ class Lens:
         """A pinhole with square pixels and its axis through the middle of the picture."""
         focal = width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
         return Lens(width, height, (focal, focal, (width - 1) / 2, (height - 1) / 2))
+
+    def fits(self, width: int, height: int) -> bool:
+        """Whether pictures of that size have its aspect ratio. Others were cut, and nobody knows where."""
+        return same_aspect((self.width, self.height), (width, height))
 
     def focal_x_px(self, size: Size) -> float:
         """Focal length along x in a picture of that size (width, height)."""
@@ -89,6 +99,32 @@ class Lens:
         if self.model == "equidistant":
             return _undistort_equidistant(self.distortion, x, y)
         return _undistort_brown(self.distortion, x, y)
+
+
+def check_matrix(matrix: Matrix, width: int, height: int) -> None:
+    """Raises LensError, with the field and the cause, for a K that no camera has whose pictures have that size."""
+    fx, _, cx, skewed, fy, cy, *last = matrix
+    if not (width and height):
+        raise LensError(f"camera_matrix: it is for pictures of {width} x {height} pixels")
+    if fx <= 0 or fy <= 0:
+        raise LensError(f"camera_matrix: focal lengths {fx:g} and {fy:g} are not positive (an uncalibrated camera?)")
+    if skewed != 0 or last != [0, 0, 1]:
+        raise LensError("camera_matrix: rows are not [fx, s, cx], [0, fy, cy], [0, 0, 1]")
+    field_deg = 2 * math.degrees(math.atan(width / 2 / fx))
+    if not FIELD_LIMITS_DEG[0] <= round(field_deg, 6) <= FIELD_LIMITS_DEG[1]:
+        raise LensError(
+            f"camera_matrix: a focal length of {fx:.4g} pixels is a view {field_deg:.5g} degrees wide; "
+            f"{FIELD_LIMITS_DEG[0]:g} to {FIELD_LIMITS_DEG[1]:g} can be"
+        )
+    if not PIXEL_LIMITS[0] <= fx / fy <= PIXEL_LIMITS[1]:
+        raise LensError(f"camera_matrix: focal lengths {fx:.4g} and {fy:.4g} are too far apart for one lens")
+    if not (-width <= cx <= 2 * width and -height <= cy <= 2 * height):
+        raise LensError(f"camera_matrix: principal point ({cx:g}, {cy:g}) lies far outside the picture")
+
+
+def same_aspect(one: Size, other: Size) -> bool:
+    """Whether pictures of two sizes have the same shape."""
+    return abs(other[0] * one[1] / (one[0] * other[1]) - 1) <= ASPECT_TOLERANCE
 
 
 def _undistort_brown(given: tuple[float, ...], x: float, y: float) -> Point:

@@ -111,8 +111,9 @@ class QueryQueue:
 class EditQueue:
     """Puts and deletes on one key expression, waiting for the loop in their order."""
 
-    def __init__(self, wake: Callable[[], None], report: Report) -> None:
+    def __init__(self, key: str, wake: Callable[[], None], report: Report) -> None:
         self.lost = 0
+        self._key = key
         self._wake = wake
         self._report = report
         self._lock = threading.Lock()
@@ -140,7 +141,7 @@ class EditQueue:
         if self.lost > self._said:
             self._said = self.lost
             bounds = f"{MAX_EDITS} edits or {MAX_EDIT_BYTES} bytes"
-            self._report("edits lost", f"{self.lost} edits lost so far: more than {bounds} waited at once")
+            self._report("edits lost", f"{self._key}: {self.lost} edits lost so far: more than {bounds} waited at once")
         return [_edit_of(sample) for sample in samples]
 
 

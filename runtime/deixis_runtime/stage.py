@@ -77,7 +77,7 @@ class Node:
 
     def subscribe_edits(self, key: str) -> EditQueue:
         """Listen to puts and deletes on a key expression, each of which counts."""
-        queue = EditQueue(self.wake, self.warn)
+        queue = EditQueue(key, self.wake, self.warn)
         self._declared.append(self._session.declare_subscriber(key, queue.store))
         self._edits.append(queue)
         return queue

@@ -52,11 +52,7 @@ def topic_table() -> str:
             f"| `{topic.path}` | {topic.type.__name__}/{topic.version} | {topic.by.value}{rate} | {topic.delivery.value} "
             f"| {'yes' if topic.queryable else 'no'} | {topic.max_bytes} | {oldest} |"
         )
-    return (
-        "# Topics\n\nWritten by `python -m deixis_schemas.export`; edit `deixis_schemas/topics.py`.\n\n"
-        + "\n".join(rows)
-        + "\n"
-    )
+    return "# Topics\n\nWritten by `make contract`; edit `deixis_schemas/topics.py`.\n\n" + "\n".join(rows) + "\n"
 
 
 def main() -> None:

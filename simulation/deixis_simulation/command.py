@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import argparse
 import re
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from deixis_cli.options import CommandError
@@ -69,7 +67,6 @@ def run(given: argparse.Namespace) -> int:
         return _write_scenes(scenes, given.out)
     if given.out is None:
         raise CommandError("--out DIR: say where the clips go (or --dry-run)")
-    signal.signal(signal.SIGTERM, _as_interrupt)
     try:
         with shown_progress(scenes) as progress:
             outcome = render_all(scenes, given.out, jobs=given.jobs, labels=given.labels, progress=progress)
@@ -131,10 +128,6 @@ def _tell(outcome: Outcome, folder: Path) -> int:
     for name, why in outcome.failed.items():
         print(f"deixis simulate: {name}: {why}", file=sys.stderr)
     return 1 if outcome.failed else 0
-
-
-def _as_interrupt(_: int, __: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _whole(low: int, high: int) -> Any:

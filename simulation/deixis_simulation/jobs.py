@@ -17,6 +17,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
+from deixis_runtime.interrupts import POLL_S, Interrupts
+
 from .clip_files import is_finished
 from .scene import Scene
 
@@ -65,7 +67,7 @@ def render_all(
 ) -> Outcome:
     """Render scenes into a folder, in this order, `jobs` at a time (as many as there are processors).
 
-    Raises Interrupted on Ctrl-C; clips that were finished then stay. OSError where the folder cannot be written.
+    Raises Interrupted on Ctrl-C and SIGTERM; clips that were finished then stay. OSError where the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     run = _Run(folder, max(1, jobs or os.cpu_count() or 1), labels, progress or Progress())
@@ -80,18 +82,23 @@ class _Run:
         self._context = multiprocessing.get_context("spawn")
 
     def all(self, scenes: Sequence[Scene]) -> Outcome:
-        waiting = [scene for scene in scenes if not self._skipped(scene)][::-1]
-        try:
-            while waiting or self._workers:
-                while waiting and len(self._workers) < self._jobs:
-                    self._start(waiting.pop())
-                self._listen()
-        except KeyboardInterrupt:
-            self._outcome.left = [worker.scene.name for worker in self._workers] + [scene.name for scene in waiting[::-1]]
-            raise Interrupted(self._outcome) from None
-        finally:
-            self._stop()
+        # Until the last worker's folder is gone: a signal that tore this apart would leave some behind.
+        with Interrupts() as interrupts:
+            try:
+                self._work_off([scene for scene in scenes if not self._skipped(scene)][::-1], interrupts)
+            finally:
+                self._stop()
         return self._outcome
+
+    def _work_off(self, waiting: list[Scene], interrupts: Interrupts) -> None:
+        """Render scenes, the last of the list first. Raises Interrupted."""
+        while waiting or self._workers:
+            if interrupts.requested():
+                self._outcome.left = [worker.scene.name for worker in self._workers] + [scene.name for scene in waiting[::-1]]
+                raise Interrupted(self._outcome)
+            while waiting and len(self._workers) < self._jobs:
+                self._start(waiting.pop())
+            self._listen()
 
     def _skipped(self, scene: Scene) -> bool:
         skipped = is_finished(scene, self._folder, labels=self._labels)
@@ -109,7 +116,7 @@ class _Run:
         self._workers.append(_Worker(process, answers, scene, workplace))
 
     def _listen(self) -> None:
-        for connection in wait([worker.answers for worker in self._workers]):
+        for connection in wait([worker.answers for worker in self._workers], POLL_S):
             worker = next(worker for worker in self._workers if worker.answers is connection)
             try:
                 answer: Answer = worker.answers.recv()

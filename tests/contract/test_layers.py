@@ -15,7 +15,8 @@ MAY_IMPORT = {
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
     "deixis_simulation": {
         *("deixis_schemas", "deixis_runtime", "deixis_cli"),
-        *("deixis_camera", "deixis_fusion", "deixis_evaluation"),  # a rehearsal plays a site's clips and scores the answers
+        # A rehearsal plays a site's clips and scores the answers, and says what the stages' settings allow.
+        *("deixis_camera", "deixis_headpose", "deixis_fusion", "deixis_evaluation"),
     },
 }
 

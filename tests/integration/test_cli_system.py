@@ -1,7 +1,6 @@
 """status, watch, doctor and poi on a running system."""
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -170,12 +169,17 @@ def test_a_second_producer_of_a_stage_is_noticed_by_status(ask, running, wait_fo
             child.terminate()
 
 
-def test_a_stopped_stage_is_shown_as_hung(ask, running):
-    pid = running.health("gesture")["pid"]
-    os.kill(pid, signal.SIGSTOP)
-    try:
-        shown = {stage["stage"]: stage["state"] for stage in json.loads(ask("status", "--json")[1])["stages"]}
-    finally:
-        os.kill(pid, signal.SIGCONT)
-    assert shown["gesture"] == "hung"
-    running.wait_until(lambda: running.health("gesture"), "it is back")
+def test_a_stopped_stage_is_shown_as_hung_once_its_last_messages_are_forgotten(ask, running, wait_for):
+    def state_of_twin():
+        stages = json.loads(ask("status", "--json")[1])["stages"]
+        return {f"{stage['stage']}/{stage['instance']}": stage["state"] for stage in stages}.get("gesture/stopped")
+
+    # One that nobody supervises: a stopped stage of `deixis run` is soon killed and started again.
+    twin = command("deixis-gesture", "--robot", ROBOT, "--connect", running.endpoint, "--instance", "stopped")
+    with subprocess.Popen(twin, stderr=subprocess.DEVNULL) as child:
+        try:
+            wait_for(lambda: state_of_twin() == "ok", "the twin")
+            child.send_signal(signal.SIGSTOP)
+            wait_for(lambda: state_of_twin() == "hung", "the twin to be called hung")
+        finally:
+            child.kill()

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from running import POINTED_AT, ROOT, command, process, system
+from running import POINTED_AT, ROOT, command, free_port, process, system, wait_until
 
 SWAP = ROOT / "examples" / "swap_headpose.py"
 
@@ -40,6 +40,28 @@ def test_the_example_takes_the_place_of_headpose_and_each_evidence_names_its_pro
     assert "yaw -" in evidence["headpose"]["observed"], "the head is turned to the person's right, which the example sees"
     assert POINTED_AT in target["poi_ids"], target["reason"]
     assert "Traceback" not in log.read_text()
+
+
+def started_alone(log, robot, endpoint, *arguments):
+    """The example, while no router listens at the endpoint."""
+    return process([sys.executable, SWAP, "--robot", robot, "--connect", endpoint, *arguments], log)
+
+
+def test_the_example_may_be_started_before_the_router_listens(tmp_path, robot):
+    endpoint, log = f"tcp/127.0.0.1:{free_port()}", tmp_path / "swap"
+    with started_alone(log, robot, endpoint):
+        wait_until(lambda: "waiting 20 s for a router" in log.read_text(), "the example to miss the router", 20, log)
+        with process([sys.executable, "-m", "deixis_runtime.router", "--listen", endpoint], tmp_path / "router"):
+            wait_until(lambda: "alive as swap-" in log.read_text(), "the example to find the router", 20, log)
+
+
+def test_without_a_router_the_example_ends_with_one_line_that_names_the_endpoint(tmp_path, robot):
+    endpoint, log = f"tcp/127.0.0.1:{free_port()}", tmp_path / "swap"
+    with started_alone(log, robot, endpoint, "--wait", "0.5") as child:
+        assert child.wait(20) == 1
+    assert log.read_text().splitlines()[1:] == [
+        f"swap_headpose: no Zenoh router answers at {endpoint} (--connect); start 'deixis run' or 'deixis up'"
+    ]
 
 
 def test_two_producers_on_one_key_are_noticed_and_said(tmp_path, robot):

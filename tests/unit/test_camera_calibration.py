@@ -109,6 +109,7 @@ def test_each_model_of_ros_is_taken_with_its_own_number_of_coefficients(
         ({"camera_matrix": array(1, 2, 3)}, "camera_matrix", "1 x 3 instead of 3 x 3"),
         ({"camera_matrix": {"rows": 3, "cols": 3, "data": [1, 2]}}, "camera_matrix", "data: 2 numbers for 3 x 3"),
         ({"camera_matrix": array(*[0] * 9, rows=3)}, "camera_matrix", "not positive"),
+        ({"camera_matrix": array(1, 0, 320, 0, 1, 240, 0, 0, 1, rows=3)}, "camera_matrix", "179.64 degrees wide"),
         ({"camera_matrix": array(600, 0, math.nan, 0, 600, 240, 0, 0, 1, rows=3)}, "camera_matrix.data", "finite"),
         ({"camera_matrix": array(600, 0, 320, 0, 600, 240, 0, 0, 0, rows=3)}, "camera_matrix", "rows are not"),
         ({"camera_matrix": array(600, 0, 32000, 0, 600, 240, 0, 0, 1, rows=3)}, "camera_matrix", "principal point"),

@@ -135,7 +135,8 @@ def monitor() -> SourceMonitor:
 
 
 def reading(**changes: object) -> Reading:
-    return Reading(**({"stage": "headpose", "alive": True, "received": 5, "age_s": 0.03} | changes))  # type: ignore[arg-type]
+    content = {"stage": "headpose", "key": "deixis/r1/headpose/poses", "alive": True, "received": 5, "age_s": 0.03}
+    return Reading(**(content | changes))  # type: ignore[arg-type]
 
 
 def test_a_stage_never_heard_of_is_dead(monitor: SourceMonitor) -> None:
@@ -147,6 +148,14 @@ def test_a_live_stage_that_misses_a_frame_is_late_and_one_that_answers_is_ok(mon
     monitor.update([reading()], 0.0)
     assert monitor.status("headpose") == ("ok", "")
     assert monitor.status("headpose", missed=True)[0] == "late"
+
+
+def test_a_live_stage_that_is_silent_without_missing_a_frame_is_ok_with_no_reason_given(
+    monitor: SourceMonitor,
+) -> None:
+    monitor.update([reading(age_s=2.0)], 0.0)
+    (state,) = [state for state in monitor.states() if state.stage == "headpose"]
+    assert (state.status, state.reason, state.age_s) == ("ok", "", 2.0)
 
 
 def test_without_token_and_silent_it_is_dead(monitor: SourceMonitor) -> None:
@@ -173,18 +182,21 @@ def test_a_forgotten_old_stage_does_not_switch_off_the_one_that_replaced_it(moni
         monitor.update([reading(rejected=rejected, **beside)], float(rejected))
         assert monitor.status("headpose") == ("ok", "")
         assert "headpose" not in monitor.dead()
-    assert monitor.refused() == ["some messages on the key of headpose are refused: HeadPoses version '1'"]
+    assert monitor.refused() == ["deixis/r1/headpose/poses: some messages are refused: HeadPoses version '1'"]
     assert "version '1'" in next(state.reason for state in monitor.states() if state.stage == "headpose")
 
 
 def test_garbage_makes_a_stage_late_with_the_reason(monitor: SourceMonitor) -> None:
     monitor.update([reading(rejected=1, age_s=5.0, last_error="poses.0.yaw_deg: too large", last_error_kind="malformed")], 1.0)
-    assert monitor.status("headpose", missed=True) == ("late", "its messages are refused: poses.0.yaw_deg: too large")
+    assert monitor.status("headpose", missed=True) == (
+        "late",
+        "its messages on deixis/r1/headpose/poses are refused: poses.0.yaw_deg: too large",
+    )
 
 
 def test_two_producers_on_one_key_are_said(monitor: SourceMonitor) -> None:
     monitor.update([reading(producers=("headpose/a", "headpose_toy/b"))], 0.0)
-    assert monitor.doubled() == ["2 producers on the key of headpose: headpose/a, headpose_toy/b"]
+    assert monitor.doubled() == ["deixis/r1/headpose/poses: 2 producers: headpose/a, headpose_toy/b"]
     state = next(state for state in monitor.states() if state.stage == "headpose")
     assert state.producers == ["headpose/a", "headpose_toy/b"]
     assert "2 producers" in state.reason

@@ -43,3 +43,34 @@ def test_a_camera_that_starts_again_without_intrinsics_does_not_take_back_its_le
     lens.hear([info(400.0), info(None)])
     assert lens.note is None
     assert lens.of_frame(640, 480).focal_x_px((640, 480)) == pytest.approx(400.0)
+
+
+def test_a_lens_that_cannot_be_is_refused_with_its_cause_and_health_says_so_until_a_good_one_comes() -> None:
+    lens = CameraLens(60.0)
+    refused = lens.hear([info(1.0)])
+    assert refused == [
+        "camera/c: camera_matrix: a focal length of 1 pixels is a view 179.64 degrees wide; 5 to 170 can be",
+    ]  # fmt: skip
+    assert lens.of_frame(640, 480) == Lens.assumed(640, 480, 60.0)
+    assert lens.note == f"camera/info: the lens of {refused[0]}; one 60 degrees wide is assumed"
+    assert lens.hear([info(400.0)]) == []
+    assert lens.note is None
+
+
+def test_after_a_lens_that_cannot_be_the_one_told_before_is_used() -> None:
+    lens = CameraLens(60.0)
+    assert len(lens.hear([info(400.0), info(1e9)])) == 1
+    assert lens.of_frame(640, 480).focal_x_px((640, 480)) == pytest.approx(400.0)
+    assert lens.note is not None
+    assert lens.note.endswith("the one told before is used")
+
+
+def test_pictures_of_another_aspect_ratio_are_said_as_long_as_they_come() -> None:
+    lens = CameraLens(60.0)
+    lens.hear([info(400.0)])
+    lens.of_frame(640, 360)
+    assert lens.note == (
+        "camera/info: the lens is for 640 x 480, pictures have 640 x 360: another aspect ratio, so angles are misread"
+    )
+    lens.of_frame(320, 240)
+    assert lens.note is None

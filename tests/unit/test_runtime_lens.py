@@ -68,7 +68,34 @@ def test_an_assumed_field_of_view_spans_the_picture():
     assert lens.ray((-0.5, 239.5), SIZE)[0] == pytest.approx(-np.tan(np.radians(30)))
 
 
-@pytest.mark.parametrize("matrix", [None, (0.0,) * 9, (-560.0, *MATRIX[1:]), (1e9, *MATRIX[1:])])
-def test_a_camera_without_intrinsics_that_can_be_is_no_lens(matrix):
-    with pytest.raises(LensError, match="camera_matrix"):
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        (None, "no intrinsics yet"),
+        (dict.fromkeys(range(9), 0.0), "not positive"),
+        ({0: -560.0}, "not positive"),
+        ({0: 1.0, 4: 1.0}, r"focal length of 1 pixels is a view 179.64 degrees wide; 5 to 170 can be"),
+        ({0: 27.0, 4: 27.0}, "view 170.35 degrees wide"),
+        ({0: 1e9, 4: 1e9}, "degrees wide"),
+        ({0: 7400.0, 4: 7400.0}, "view 4.9522 degrees wide"),
+        ({4: 100.0}, "too far apart"),
+        ({8: 0.0}, "rows are not"),
+        ({2: 3200.0}, "principal point"),
+    ],
+)
+def test_a_camera_without_intrinsics_that_can_be_is_no_lens(changed, why):
+    matrix = None if changed is None else tuple(changed.get(index, value) for index, value in enumerate(MATRIX))
+    with pytest.raises(LensError, match=f"camera_matrix: .*{why}"):
         Lens.of(camera_info().model_copy(update={"camera_matrix": matrix}))
+
+
+@pytest.mark.parametrize("horizontal_fov_deg", [5.0, 10.0, 60.0, 120.0, 170.0])
+def test_every_lens_that_may_be_assumed_is_one_that_can_be(horizontal_fov_deg):
+    focal, _, cx, cy = Lens.assumed(*SIZE, horizontal_fov_deg).matrix
+    told = camera_info().model_copy(update={"camera_matrix": (focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)})
+    assert Lens.of(told) == Lens.assumed(*SIZE, horizontal_fov_deg)
+
+
+def test_a_matrix_for_pictures_of_no_size_is_no_lens():
+    with pytest.raises(LensError, match="pictures of 0 x 480"):
+        Lens.of(camera_info().model_copy(update={"width": 0}))

@@ -109,3 +109,8 @@ def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path):
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SiteError, match=r"b\.csv: not UTF-8"):
         load_pois(tmp_path / "b.csv")
+
+
+def test_the_example_that_the_readme_imports_can_be_read():
+    pois = load_pois(Path(__file__).parents[2] / "examples" / "exhibits.csv")
+    assert [(poi.poi_id, poi.tags) for poi in pois] == [("lamp", []), ("chart", ["paper", "maps"]), ("anchor", ["iron"])]

@@ -39,7 +39,7 @@ def put(number, size=10):
 
 
 def test_a_burst_of_edits_is_kept_whole_and_in_its_order(log):
-    queue = EditQueue(no_wake, log)
+    queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(5000):
         queue.store(put(number))
     assert [int(edit.payload) for edit in queue.take_all()] == list(range(5000))
@@ -48,7 +48,7 @@ def test_a_burst_of_edits_is_kept_whole_and_in_its_order(log):
 
 def test_past_the_bound_the_newest_edits_are_lost_counted_and_said_once(log, monkeypatch):
     monkeypatch.setattr(queries, "MAX_EDITS", 100)
-    queue = EditQueue(no_wake, log)
+    queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(103):
         queue.store(put(number))
     assert [int(edit.payload) for edit in queue.take_all()] == list(range(100))
@@ -56,11 +56,11 @@ def test_past_the_bound_the_newest_edits_are_lost_counted_and_said_once(log, mon
     queue.store(put(7))
     assert len(queue.take_all()) == 1, "there is room again"
     assert len(log.said) == 1
-    assert "3 edits lost" in log.said[0]
+    assert "deixis/r1/fusion/poi/**: 3 edits lost" in log.said[0]
 
 
 def test_edits_are_bounded_by_their_bytes_too(log):
-    queue = EditQueue(no_wake, log)
+    queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(40):
         queue.store(put(number, size=1 << 20))
     assert len(queue.take_all()) == 32
@@ -206,7 +206,7 @@ def test_step_times_are_those_of_the_last_second():
 
 
 def test_queues_may_be_filled_while_they_are_emptied(log):
-    queue, heard = EditQueue(no_wake, log), []
+    queue, heard = EditQueue("deixis/r1/fusion/poi/**", no_wake, log), []
     writer = threading.Thread(target=lambda: [queue.store(put(number)) for number in range(3000)])
     writer.start()
     while writer.is_alive():

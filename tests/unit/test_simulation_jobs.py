@@ -22,12 +22,13 @@ def finish(item, folder):
 
 def work(item, folder, workplace, _, answers):
     """Stands for rendering; what happens is in the name."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # forked, it has its parent's handler
     (workplace / "begun").touch()
     if item.name == "dies":
         os.kill(os.getpid(), signal.SIGKILL)
     answers.send(("frame", ""))
-    if item.name == "stops":
-        os.kill(os.getppid(), signal.SIGINT)
+    if item.name.startswith("SIG"):
+        os.kill(os.getppid(), signal.Signals[item.name])
         signal.pause()
     if item.name == "fails":
         answers.send(("failed", "no reason"))
@@ -63,12 +64,25 @@ def test_finished_clips_are_not_begun(tmp_path):
     assert (outcome.skipped, outcome.rendered) == (["a"], ["b"])
 
 
-@pytest.mark.usefixtures("stand_in")
-def test_an_interrupt_says_what_is_finished_and_what_is_left(tmp_path):
+@pytest.fixture
+def survives_sigterm():
+    """SIGTERM that nobody hears fails the test instead of ending it."""
+
+    def unheard(*_):
+        raise AssertionError("SIGTERM would have ended the process and left its folders")
+
+    before = signal.signal(signal.SIGTERM, unheard)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.usefixtures("stand_in", "survives_sigterm")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_to_stop_says_what_is_finished_and_what_is_left_and_leaves_no_folder(tmp_path, name):
     with pytest.raises(jobs.Interrupted) as raised:
-        jobs.render_all([scene(name) for name in ("a", "stops", "b")], tmp_path, jobs=1)
+        jobs.render_all([scene(name) for name in ("a", name, "b")], tmp_path, jobs=1)
     assert raised.value.outcome.rendered == ["a"]
-    assert raised.value.outcome.left == ["stops", "b"]
+    assert raised.value.outcome.left == [name, "b"]
     assert not list(tmp_path.glob(".unfinished*"))
 
 

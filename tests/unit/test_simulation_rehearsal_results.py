@@ -104,7 +104,19 @@ def test_advice_about_the_picture(ground: Ground) -> None:
     near = advise(ground, aims_of(ground, given_places(ground, [(1.4, -0.4)])), None)
     outside = next(item for item in near if item.topic == "hand_outside")
     assert "holds the fingertip out of the picture (60° wide)" in outside.text
-    assert "beyond_reach" in {item.topic for item in near}
+
+
+def test_advice_tells_from_where_on_a_head_is_out_of_range_by_the_setting_of_headpose(tmp_path: Path) -> None:
+    said = {}
+    for method, range_deg in (("regression", 130), ("regression", 100), ("ellipsoid", 130)):
+        path, headpose = tmp_path / "site.yaml", {"method": method, "range_deg": range_deg}
+        path.write_text(yaml.safe_dump({"pois": POIS, "settings": {"headpose": headpose}}))
+        ground = ground_of(load_site(path))
+        advice = advise(ground, aims_of(ground, given_places(ground, [(1.4, -0.4)])), None)
+        said[method, range_deg] = next((item.text for item in advice if item.topic == "beyond_reach"), "")
+    assert said["regression", 130].startswith("The door (135°) lies beyond 130° from the line to the camera")
+    assert " lie beyond 100° from the line to the camera" in said["regression", 100]
+    assert said["ellipsoid", 130] == said["regression", 100]
 
 
 def test_report_reads_as_json_and_on_screen(ground: Ground) -> None:

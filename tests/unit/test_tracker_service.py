@@ -27,10 +27,10 @@ class OneFrameNode:
             encoding="bgr8",
             data=image.tobytes(),
         )
-        self.counted, self.notes, self.answers, self._turns = {}, {}, [], 1
+        self.counted, self.notes, self.warned, self.answers, self._turns = {}, {}, {}, [], 1
 
     def subscribe(self, _topic):
-        return SimpleNamespace(take=lambda: self.frame)
+        return SimpleNamespace(take=lambda: self.frame, key="deixis/r1/camera/frame")
 
     def publish(self, _topic):
         return SimpleNamespace(put=self.answers.append)
@@ -49,13 +49,14 @@ class OneFrameNode:
         self.notes[key] = text
 
     def warn(self, kind, text):
-        pass
+        self.warned[kind] = text
 
 
-def test_a_frame_that_is_too_small_is_counted_and_answered_without_tracks():
+def test_a_frame_that_is_too_small_is_counted_named_by_its_key_and_answered_without_tracks():
     node = OneFrameNode(16, 16)
     service.serve(node, TrackerConfig())
     assert node.counted == {"frames_refused": 1}
+    assert node.warned["frame"].startswith("deixis/r1/camera/frame: frame 0 of camera/test refused: ")
     assert [answer.tracks for answer in node.answers] == [[]]
 
 

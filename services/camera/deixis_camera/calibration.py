@@ -8,13 +8,10 @@ from pathlib import Path
 from typing import Annotated, Literal, Protocol
 
 import yaml
+from deixis_runtime.lens import Matrix, check_matrix, same_aspect
 from deixis_schemas.codec import say
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-ASPECT_TOLERANCE = 0.02
-"""Scaling to whole pixels changes the ratio of a small picture by about 1 %."""
-
-Matrix = tuple[float, float, float, float, float, float, float, float, float]
 DistortionModel = Literal["none", "plumb_bob", "rational_polynomial", "equidistant"]
 COEFFICIENTS: dict[DistortionModel, tuple[int, ...]] = {
     "none": (0,),
@@ -81,7 +78,7 @@ class RosCalibration:
         Raises CalibrationError where the ratio differs: the picture is then cut, and the file does not say where.
         """
         along_x, along_y = width / self.width, height / self.height
-        if abs(along_x / along_y - 1) > ASPECT_TOLERANCE:
+        if not same_aspect((self.width, self.height), (width, height)):
             raise CalibrationError(
                 f"calibration '{self.name}' is for {self.width} x {self.height}, the picture has {width} x {height}: "
                 "another aspect ratio; calibrate at this size"
@@ -145,13 +142,8 @@ class _CameraInfoFile(BaseModel):
         matrix = self.camera_matrix
         if (matrix.rows, matrix.cols) != (3, 3):
             raise ValueError(f"camera_matrix: {matrix.rows} x {matrix.cols} instead of 3 x 3")
-        fx, _, cx, skewed, fy, cy, *last = matrix.data
-        if fx <= 0 or fy <= 0:
-            raise ValueError(f"camera_matrix: focal lengths {fx:g} and {fy:g} are not positive (an uncalibrated camera?)")
-        if skewed != 0 or last != [0, 0, 1]:
-            raise ValueError("camera_matrix: rows are not [fx, s, cx], [0, fy, cy], [0, 0, 1]")
-        if not (-self.image_width <= cx <= 2 * self.image_width and -self.image_height <= cy <= 2 * self.image_height):
-            raise ValueError(f"camera_matrix: principal point ({cx:g}, {cy:g}) lies far outside the picture")
+        a, b, c, d, e, f, g, h, i = matrix.data
+        check_matrix((a, b, c, d, e, f, g, h, i), self.image_width, self.image_height)
         return self
 
     @model_validator(mode="after")

@@ -139,9 +139,8 @@ class CameraStage:
         if unanswered is not None:
             self._node.count("lockstep_unanswered")
             limit = self._config.lockstep_timeout_s
-            self._node.warn(
-                "lockstep", f"{topics.BELIEF.stage} did not answer frame {unanswered} within {limit:g} s; the next is fed"
-            )
+            key = topics.BELIEF.key(self._node.robot)
+            self._node.warn("lockstep", f"{key}: no answer to frame {unanswered} within {limit:g} s; the next is fed")
         self._publish(picture, LOCKSTEP_EPOCH_NS + picture.time_ns)
         self._lockstep.sent(FrameId(picture.run, picture.seq), now_s)
 

@@ -42,19 +42,19 @@ class PoiEdits:
         self.rejections: deque[RejectedEdit] = deque(maxlen=KEPT_REJECTIONS)
 
     def take(self, edits: Sequence[Edit], now_ns: int) -> list[str]:
-        """Do edits that nobody waits for, in one transaction. Returns why some of them were refused."""
+        """Do edits that nobody waits for, in one transaction. Returns key and cause of those that were refused."""
         keys, changes, refused = [], [], []
         for edit in edits:
             try:
                 change = self._change(edit.kind, edit.key, edit.payload, edit.encoding, now_ns)
             except EditError as error:
-                refused.append(self._reject(edit.key, str(error), now_ns))
+                refused.append(f"{edit.key[:200]}: {self._reject(edit.key, str(error), now_ns)}")
             else:
                 keys.append(edit.key)
                 changes.append(change)
         for key, result in zip(keys, self._registry.apply(changes), strict=True):
             if isinstance(result, RegistryError):
-                refused.append(self._reject(key, str(result), now_ns))
+                refused.append(f"{key[:200]}: {self._reject(key, str(result), now_ns)}")
             else:
                 self.accepted += 1
         return refused

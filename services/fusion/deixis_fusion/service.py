@@ -104,7 +104,7 @@ class FusionService:
         if edits:
             refused = self._edits.take(edits, self._node.now_ns())
             if refused:
-                self._node.warn("edit", f"{len(refused)} of {len(edits)} edits refused: {refused[0]}")
+                self._node.warn("edit", f"{len(refused)} of {len(edits)} POI edits refused, the first {refused[0]}")
             self._after_edits()
         lost = self._poi_edits.lost
         self._count_to("edits_lost", lost)
@@ -135,7 +135,10 @@ class FusionService:
     def _hear_camera(self, info: CameraInfo, now_s: float) -> None:
         lacking = self._fusion.set_camera(info)
         self._end.hear(info, now_s)
-        unplaced = f"persons cannot be placed: {lacking}" if lacking and info.state == "streaming" else None
+        if lacking and info.camera_matrix is not None:
+            self._node.count("lenses_refused")
+            self._node.warn("lens", f"{self._camera.key}: not used: {info.stage}/{info.instance}: {lacking}")
+        unplaced = f"persons cannot be placed: {self._camera.key}: {lacking}" if lacking and info.state == "streaming" else None
         self._node.note("intrinsics", unplaced)
 
     def _place_robot(self) -> None:
@@ -152,6 +155,7 @@ class FusionService:
         return [
             Reading(
                 stage=stage,
+                key=subscription.key,
                 alive=stage in alive,
                 received=subscription.received,
                 rejected=subscription.rejected,

@@ -21,6 +21,7 @@ class Reading:
 
     stage: str
     alive: bool
+    key: str = ""
     received: int = 0
     rejected: int = 0
     age_s: float | None = None
@@ -54,14 +55,15 @@ class SourceMonitor:
         # forgot would switch off the one that replaced it.
         if silent and self._refused_lately(reading):
             kind: SourceStatus = "wrong_version" if reading.last_error_kind == "wrong_version" else "late"
-            return kind, f"its messages are refused: {reading.last_error}"
+            return kind, f"its messages on {reading.key} are refused: {reading.last_error}"
         if silent and not reading.alive:
             return "dead", "no such process is alive" if reading.age_s is None else f"gone, silent for {reading.age_s:.1f} s"
         if missed:
             return "late", "did not answer this frame in time"
         if silent and reading.age_s is None:
             return "late", "alive, but has sent nothing yet"
-        return "ok", f"silent for {reading.age_s:.0f} s" if silent else ""
+        # Alive and silent is no fault: no frame came, or what it says changes seldom. How long, says `age_s`.
+        return "ok", ""
 
     def dead(self) -> set[str]:
         """The stages that are not worth waiting for."""
@@ -73,23 +75,14 @@ class SourceMonitor:
 
     def refused(self) -> list[str]:
         """One sentence for each key on which messages were refused lately beside others that were accepted."""
-        return [
-            f"some messages on the key of {reading.stage} are refused: {reading.last_error}"
-            for reading in self._readings.values()
-            if self._refused_lately(reading) and self.status(reading.stage)[0] == "ok"
-        ]
+        return [text for reading in self._readings.values() if (text := self._refused_beside(reading))]
 
     def doubled(self) -> list[str]:
         """One sentence for each key on which several processes publish."""
-        return [
-            f"{len(reading.producers)} producers on the key of {reading.stage}: {', '.join(sorted(reading.producers))}"
-            for reading in self._readings.values()
-            if len(reading.producers) > 1
-        ]
+        return [text for reading in self._readings.values() if (text := _doubled(reading))]
 
     def _state(self, reading: Reading) -> SourceState:
         status, reason = self.status(reading.stage)
-        beside = [text for text in (*self.refused(), *self.doubled()) if f" of {reading.stage}" in text]
         return SourceState(
             stage=reading.stage,
             status=status,
@@ -97,13 +90,26 @@ class SourceMonitor:
             age_s=reading.age_s,
             received=reading.received,
             rejected=reading.rejected,
-            reason="; ".join(part for part in (reason, *beside) if part)[:MAX_TEXT],
+            reason="; ".join(part for part in (reason, self._refused_beside(reading), _doubled(reading)) if part)[:MAX_TEXT],
         )
+
+    def _refused_beside(self, reading: Reading) -> str:
+        """What was refused on the key of a stage that is understood; empty where nothing was."""
+        if not self._refused_lately(reading) or self.status(reading.stage)[0] != "ok":
+            return ""
+        return f"{reading.key}: some messages are refused: {reading.last_error}"
 
     def _refused_lately(self, reading: Reading) -> bool:
         """Whether a message on its key was refused not long ago."""
         at_s = self._rejected_s.get(reading.stage)
         return at_s is not None and self._now_s - at_s <= self._dead_after_s
+
+
+def _doubled(reading: Reading) -> str:
+    """Who publishes on the key of a stage, where there are several; else empty."""
+    if len(reading.producers) < 2:
+        return ""
+    return f"{reading.key}: {len(reading.producers)} producers: {', '.join(sorted(reading.producers))}"
 
 
 class SourceEnd:

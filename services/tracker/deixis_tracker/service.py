@@ -27,7 +27,7 @@ def serve(node: Node, config: TrackerConfig) -> None:
                 tracks = tracker.update(decode_image(frame), frame.run, frame.stamp_ns)
             except (ImageError, FrameRefused) as error:
                 node.count("frames_refused")
-                node.warn("frame", f"frame {frame.seq} refused: {error}")
+                node.warn("frame", f"{frames.key}: frame {frame.seq} of {frame.stage}/{frame.instance} refused: {error}")
                 tracks = []  # fusion still waits for an answer to this frame
             else:
                 if tracker.left_out:

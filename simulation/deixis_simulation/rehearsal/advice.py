@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from .aims import REACH_DEG, SMALL_FACE_PX, Aim, ClosePair, Hidden, close_pairs, face_px
+from .aims import SMALL_FACE_PX, Aim, ClosePair, Hidden, close_pairs, face_px
 from .answers import Cause
 from .confusion import Confusion, PoiResult
 from .ground import FARTHEST_M, Ground, GroundPoi
@@ -21,7 +21,7 @@ CAUSES: dict[Cause, str] = {
     "small": "the person is too small in the picture",
     "close": "what was answered lies next to it",
     "not_seen": "the gesture was not seen as pointing",
-    "beyond_reach": f"the head turns beyond {REACH_DEG:g}°, where its pose is not told",
+    "beyond_reach": "the head turns beyond its range, where only its side is told",
     "head_off": "the head's pose was misread",
     "hand_off": "the hand's direction was misread",
     "looked_away": "the person did not look where the hand pointed",
@@ -127,15 +127,15 @@ def _outside(ground: Ground, place: Place, aims: Sequence[Aim]) -> Advice | None
     return Advice("hand_outside", text, _ids(pois), (place.letter,))
 
 
-def _turned(_: Ground, place: Place, aims: Sequence[Aim]) -> Advice | None:
+def _turned(ground: Ground, place: Place, aims: Sequence[Aim]) -> Advice | None:
     turned = [aim for aim in aims if aim.place == place and aim.hidden is None and aim.beyond_reach]
     if not turned:
         return None
     seen = _and([f"{aim.poi.name} ({abs(aim.azimuth_deg):.0f}°)" for aim in turned])
     verb = "lie" if len(turned) > 1 else "lies"
     text = (
-        f"{_capital(seen)} {verb} beyond {REACH_DEG:g}° from the line to the camera seen from {place.words}: out there "
-        "the head's pose is not told, only its side."
+        f"{_capital(seen)} {verb} beyond {ground.head_range_deg:g}° from the line to the camera seen from "
+        f"{place.words}: out there the head's pose is not told, only its side."
     )
     return Advice("beyond_reach", text, _ids([aim.poi for aim in turned]), (place.letter,))
 

@@ -21,8 +21,6 @@ Hidden = Literal["wall", "behind", "here"]
 
 BEHIND_DEG = 150.0
 """People who face the robot do not point farther back than this."""
-REACH_DEG = 100.0
-"""Beyond this bearing a head that follows the hand is out of the head pose's range."""
 TOWARD_CAMERA_DEG = 25.0
 """Below this bearing the hand is in front of the body, seen end-on: fusion's `hand.min_deg`."""
 CLOSE_DEG = 12.0
@@ -40,6 +38,7 @@ class Aim:
 
     azimuth_deg: at the person from the direction to the camera, positive toward the person's own left. hidden: why it is not
     pointed at, none where it is. hand_in_picture: whether the fingertip of an arm stretched toward it is in the picture.
+    beyond_reach: whether the head is out of range while it looks there.
     """
 
     place: Place
@@ -47,11 +46,7 @@ class Aim:
     azimuth_deg: float
     hidden: Hidden | None
     hand_in_picture: bool
-
-    @property
-    def beyond_reach(self) -> bool:
-        """Whether the head is out of range while it looks there."""
-        return abs(self.azimuth_deg) > REACH_DEG
+    beyond_reach: bool
 
     @property
     def toward_camera(self) -> bool:
@@ -100,6 +95,7 @@ def _aim(ground: Ground, view: View, place: Place, poi: GroundPoi) -> Aim:
         azimuth_deg=azimuth,
         hidden=_hidden(ground, place, poi, azimuth),
         hand_in_picture=sees_point(view, fingertip_m(place.position_m, ground.camera_foot, poi, azimuth)),
+        beyond_reach=abs(azimuth) > ground.head_range_deg,
     )
 
 

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 from deixis_camera.calibration import AssumedFieldOfView, Calibration, CalibrationError, Intrinsics, load_calibration
 from deixis_camera.config import CameraConfig
 from deixis_fusion.config import FusionConfig
+from deixis_headpose.config import HeadposeConfig
+from deixis_headpose.ellipsoid_head import FARTHEST_DEG
 from deixis_runtime.occupancy_map import wall_lines
 from deixis_runtime.settings import StageConfig
 from deixis_runtime.site import Site, SiteError, SitePoi
@@ -76,7 +78,8 @@ class Ground:
 
     pinhole_px: focal length of the pinhole that must stand in for the site's own calibration, for the renderer draws no
     distortion; none where the camera stage reads the clips as they are. too_far: POIs that are left out.
-    clearance_m: fusion's `place.wall_clearance_m`. notes: sentences on what is drawn otherwise than the site is.
+    clearance_m: fusion's `place.wall_clearance_m`. head_range_deg: to which yaw headpose tells heads.
+    notes: sentences on what is drawn otherwise than the site is.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Ground:
     walls: tuple[Wall, ...]
     frame: RobotFrame
     clearance_m: float
+    head_range_deg: float
     pinhole_px: float | None = None
     too_far: tuple[GroundPoi, ...] = ()
     notes: tuple[str, ...] = ()
@@ -126,6 +130,7 @@ def ground_of(site: Site) -> Ground:
         walls=tuple((frame.of_map(a), frame.of_map(b)) for a, b in walls),
         frame=frame,
         clearance_m=fusion.place.wall_clearance_m,
+        head_range_deg=_head_range_deg(_settings(HeadposeConfig, site.settings.get("headpose", {}), site.path)),
         pinhole_px=pinhole_px,
         too_far=tuple(poi for poi in pois if poi not in near),
         notes=tuple(notes),
@@ -137,6 +142,10 @@ def _settings(model: type[C], content: Mapping[str, Any], path: Path) -> C:
         return model.model_validate(content)
     except ValidationError as error:
         raise RehearsalError(f"site file {path}: {say(error)}") from None
+
+
+def _head_range_deg(settings: HeadposeConfig) -> float:
+    return settings.range_deg if settings.method == "regression" else min(settings.range_deg, FARTHEST_DEG)
 
 
 def _poi(poi: SitePoi, frame: RobotFrame) -> GroundPoi:
