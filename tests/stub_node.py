@@ -1,9 +1,10 @@
 """A node without a session: for tests of a stage's shell alone."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from deixis_schemas.messages import Message, Producer
+from deixis_schemas.messages import HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
 
@@ -24,16 +25,21 @@ class Inbox:
 class StubNode:
     """Hands the stage the messages of one turn of its loop after the other, and keeps what it says.
 
-    `published` are its messages, `notes` those of its health at the end of each turn.
+    `published` are its messages, `notes`, `states` (with their reasons) and `counters` those of its health, the first two at
+    the end of each turn.
     """
 
     def __init__(self, stage: str, turns: Sequence[Sequence[Message]]) -> None:
         self.producer = Producer(stage, "stub")
         self.published: list[Message] = []
         self.notes: list[dict[str, str]] = []
+        self.states: list[tuple[HealthState, str]] = []
+        self.counters: Counter[str] = Counter()
+        self.robot = "stub"
         self._turns = iter(turns)
         self._first = True
         self._now: dict[str, str] = {}
+        self._state: tuple[HealthState, str] = ("ok", "")
         self._inboxes: dict[type[Message], Inbox] = {}
 
     def subscribe(self, topic: Topic, **_bounds: int) -> Inbox:
@@ -48,6 +54,7 @@ class StubNode:
     def wait(self) -> bool:
         if not self._first:
             self.notes.append(dict(self._now))
+            self.states.append(self._state)
         self._first = False
         turn = next(self._turns, None)
         for message in turn or ():
@@ -62,3 +69,9 @@ class StubNode:
         self._now.pop(key, None)
         if text is not None:
             self._now[key] = text
+
+    def set_state(self, state: HealthState, reason: str = "") -> None:
+        self._state = (state, reason)
+
+    def count(self, name: str, n: int = 1) -> None:
+        self.counters[name] += n

@@ -8,6 +8,9 @@ from deixis_schemas.messages import CameraInfo, CameraMount
 
 from .lens import Lens, LensError
 
+ASPECT_TOLERANCE = 0.01
+"""Pictures scaled to whole pixels differ by less from the camera's aspect ratio."""
+
 
 class CameraLens:
     """Keeps the newest intrinsics of a camera; before there are any, a pinhole of `horizontal_fov_deg` stands in."""
@@ -31,6 +34,19 @@ class CameraLens:
     def of_frame(self, width: int, height: int) -> Lens:
         """The lens to read pictures of that size with."""
         return self._told or Lens.assumed(width, height, self._fov_deg)
+
+    def misfit(self, width: int, height: int) -> str | None:
+        """Why angles in pictures of that size are off: of another shape than the lens was told for. None where they are not.
+
+        Where the picture was cut, and so where its axis is, no message tells.
+        """
+        told = self._told
+        if told is None or abs(width * told.height / (height * told.width) - 1) < ASPECT_TOLERANCE:
+            return None
+        return (
+            f"camera/info tells a lens for {told.width} x {told.height}, camera/frame is {width} x {height}, "
+            "of another aspect ratio: angles are off"
+        )
 
     @property
     def note(self) -> str | None:

@@ -43,3 +43,20 @@ def test_a_camera_that_starts_again_without_intrinsics_does_not_take_back_its_le
     lens.hear([info(400.0), info(None)])
     assert lens.note is None
     assert lens.of_frame(640, 480).focal_x_px((640, 480)) == pytest.approx(400.0)
+
+
+@pytest.mark.parametrize("size", [(640, 480), (1280, 960), (320, 240), (427, 320)])
+def test_pictures_scaled_to_another_size_fit_the_lens(size: tuple[int, int]) -> None:
+    lens = CameraLens(60.0)
+    assert lens.misfit(*size) is None
+    lens.hear([info(400.0)])
+    assert lens.misfit(*size) is None
+
+
+def test_pictures_of_another_aspect_ratio_do_not_fit_the_lens_and_both_sizes_are_said() -> None:
+    lens = CameraLens(60.0)
+    lens.hear([info(400.0)])
+    said = lens.misfit(640, 360)
+    assert said is not None
+    assert "640 x 480" in said
+    assert "640 x 360" in said
