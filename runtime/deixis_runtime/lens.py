@@ -19,6 +19,8 @@ Square = tuple[Row, Row, Row]
 
 UNDISTORT_STEPS = 20
 FOCAL_LIMITS_PX = (1.0, 1e6)
+OFF_PICTURE = 10
+"""So many pictures away the axis of a lens may be, where the picture was cut out of a larger one."""
 
 
 class LensError(ValueError):
@@ -54,6 +56,8 @@ class Lens:
         fx, _, cx, _, fy, cy, *_ = info.camera_matrix
         if not all(FOCAL_LIMITS_PX[0] <= focal <= FOCAL_LIMITS_PX[1] for focal in (fx, fy)):
             raise LensError(f"camera_matrix: focal lengths of {fx:.3g} and {fy:.3g} pixels")
+        if abs(cx) > OFF_PICTURE * info.width or abs(cy) > OFF_PICTURE * info.height:
+            raise LensError(f"camera_matrix: principal point at {cx:.3g}, {cy:.3g} of {info.width} x {info.height} pixels")
         model = info.distortion_model if any(info.distortion) else "none"
         return Lens(info.width, info.height, (fx, fy, cx, cy), model, tuple(info.distortion))
 

@@ -8,6 +8,7 @@ from deixis_schemas.messages import CameraInfo
 
 SIZE = (640, 480)
 MATRIX = (560.0, 0.0, 330.0, 0.0, 555.0, 236.0, 0.0, 0.0, 1.0)
+FAR_OFF = [(*MATRIX[:2], 1e300, *MATRIX[3:]), (*MATRIX[:5], -1e4, *MATRIX[6:])]
 PLUMB_BOB = [0.05, -0.1, 0.002, -0.001, 0.02]
 RATIONAL = [*PLUMB_BOB, 0.03, 0.01, -0.004]
 PRISM = [*RATIONAL, 0.01, -0.004, -0.006, 0.003]
@@ -68,7 +69,7 @@ def test_an_assumed_field_of_view_spans_the_picture():
     assert lens.ray((-0.5, 239.5), SIZE)[0] == pytest.approx(-np.tan(np.radians(30)))
 
 
-@pytest.mark.parametrize("matrix", [None, (0.0,) * 9, (-560.0, *MATRIX[1:]), (1e9, *MATRIX[1:])])
+@pytest.mark.parametrize("matrix", [None, (0.0,) * 9, (-560.0, *MATRIX[1:]), (1e9, *MATRIX[1:]), *FAR_OFF])
 def test_a_camera_without_intrinsics_that_can_be_is_no_lens(matrix):
     with pytest.raises(LensError, match="camera_matrix"):
         Lens.of(camera_info().model_copy(update={"camera_matrix": matrix}))
