@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from deixis_schemas.messages import Message, Producer
+from deixis_schemas.messages import HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
 
@@ -26,7 +26,8 @@ class Inbox:
 class StubNode:
     """Hands the stage the messages of one turn of its loop after the other, and keeps what it says.
 
-    `published` are its messages, `notes` those of its health at the end of each turn, `warnings` and `counters` all of them.
+    `published` are its messages, `warnings` and `counters` all of them, `notes` and `states` (with their reasons) those of its
+    health at the end of each turn.
     """
 
     def __init__(self, stage: str, turns: Sequence[Sequence[Message]]) -> None:
@@ -34,10 +35,13 @@ class StubNode:
         self.published: list[Message] = []
         self.notes: list[dict[str, str]] = []
         self.warnings: list[str] = []
+        self.states: list[tuple[HealthState, str]] = []
         self.counters: Counter[str] = Counter()
+        self.robot = "stub"
         self._turns = iter(turns)
         self._first = True
         self._now: dict[str, str] = {}
+        self._state: tuple[HealthState, str] = ("ok", "")
         self._inboxes: dict[type[Message], Inbox] = {}
 
     def subscribe(self, topic: Topic, **_bounds: int) -> Inbox:
@@ -52,6 +56,7 @@ class StubNode:
     def wait(self) -> bool:
         if not self._first:
             self.notes.append(dict(self._now))
+            self.states.append(self._state)
         self._first = False
         turn = next(self._turns, None)
         for message in turn or ():
@@ -62,8 +67,11 @@ class StubNode:
     def step(self) -> Iterator[None]:
         yield
 
-    def count(self, name: str) -> None:
-        self.counters[name] += 1
+    def set_state(self, state: HealthState, reason: str = "") -> None:
+        self._state = (state, reason)
+
+    def count(self, name: str, n: int = 1) -> None:
+        self.counters[name] += n
 
     def warn(self, _kind: str, text: str) -> None:
         self.warnings.append(text)
@@ -72,3 +80,9 @@ class StubNode:
         self._now.pop(key, None)
         if text is not None:
             self._now[key] = text
+
+    def set_state(self, state: HealthState, reason: str = "") -> None:
+        self._state = (state, reason)
+
+    def count(self, name: str, n: int = 1) -> None:
+        self.counters[name] += n

@@ -225,6 +225,24 @@ def test_a_covered_face_is_held_then_lost_and_started_anew_from_the_front() -> N
     assert after[-1].yaw_deg == pytest.approx(0.0, abs=1.0)
 
 
+@pytest.mark.parametrize("method", ["ellipsoid", "affine"])
+def test_a_face_covered_for_longer_than_anything_is_known_of_it_is_lost_and_not_held(method: str) -> None:
+    """Held for 3 s its sigma passed what a message can say, and the stage ended."""
+    estimator = HeadPoseEstimator(HeadposeConfig.model_validate({"method": method, "hold_s": 5}))
+    pose, noise = turned_to(0.0), np.random.default_rng(2)
+    unseen = face_of(pose).model_copy(update={"frontal": None})
+    for k in range(4):
+        estimator.update(painted_head(pose), [face_of(pose)], LENS, 1, k * FRAME_NS)
+    said = [
+        estimator.update(noise.integers(0, 255, (240, 320), dtype=np.uint8), [unseen], LENS, 1, (4 + k) * 100_000_000)[0]
+        for k in range(34)
+    ]
+    statuses = [head.status for head in said]
+    assert statuses == ["tracking"] * statuses.count("tracking") + ["lost"] * statuses.count("lost")
+    assert statuses.count("tracking") > 5
+    assert statuses.count("lost") > 5
+
+
 def test_a_head_turned_beyond_the_range_is_said_to_be_out_of_it_on_its_side() -> None:
     estimator = HeadPoseEstimator(HeadposeConfig(method="affine", range_deg=31.0))
     poses = [turned_to(-2.0 * max(0, k - 3)) for k in range(34)]

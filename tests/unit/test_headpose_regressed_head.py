@@ -117,6 +117,27 @@ def test_a_head_found_again_is_read_anew_and_not_drawn_from_where_it_was() -> No
     assert state.angles_deg[0] == pytest.approx(50)
 
 
+@pytest.mark.parametrize(("hold_s", "frame_s"), [(0.0, 1 / 30), (0.01, 1 / 30), (0.25, 1 / 3), (0.25, 1.0)])
+def test_looks_one_after_the_other_are_weighed_together_however_short_a_head_is_held(hold_s: float, frame_s: float) -> None:
+    """A hold shorter than from frame to frame switched the filter off, and single looks were told as they were."""
+    head, rng = RegressedHead(HeadposeConfig(hold_s=hold_s), Regression()), np.random.default_rng(4)
+    looks = 20 + rng.normal(0, 2, 200)
+    states = [head.take(a_look(yaw), round(number * frame_s * 1e9)) for number, yaw in enumerate(looks)]
+    apart = [abs(state.angles_deg[0] - yaw) for state, yaw in zip(states, looks, strict=True) if state.angles_deg is not None]
+    assert len(apart) == 200
+    assert np.count_nonzero(apart) > 190
+    yaws = [state.angles_deg[0] for state in states[20:] if state.angles_deg is not None]
+    assert np.std(yaws) < np.std(looks[20:])
+
+
+def test_an_old_look_does_not_draw_a_head_that_is_seen_again_after_seconds_without_a_frame() -> None:
+    head = RegressedHead(CONFIG, Regression())
+    head.take(a_look(60), 0)
+    state = head.take(a_look(0.0), 3_000_000_000)
+    assert state.angles_deg is not None
+    assert abs(state.angles_deg[0]) < 1
+
+
 def test_a_look_that_is_hardly_sure_is_no_answer() -> None:
     assert followed([a_look(10, sigma_deg=57)])[0].status == "lost"
 

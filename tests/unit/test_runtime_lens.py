@@ -81,6 +81,7 @@ def test_an_assumed_field_of_view_spans_the_picture():
         ({4: 100.0}, "too far apart"),
         ({8: 0.0}, "rows are not"),
         ({2: 3200.0}, "principal point"),
+        ({2: 1e300}, "principal point"),
     ],
 )
 def test_a_camera_without_intrinsics_that_can_be_is_no_lens(changed, why):

@@ -25,10 +25,10 @@ from .affine import match_patch, refusal, take_template, transform
 from .config import HeadposeConfig
 from .ellipsoid_head import FARTHEST_DEG, MOVED_ON_S, SAME_PLACE_M, WALKING_M_S
 from .head import Array, Surface
-from .initialise import Initialiser, frontal_pose
+from .initialise import Initialiser, frontal_of, frontal_pose
 from .neck import LEVER_M
 from .patch import Level, pyramid
-from .sight import HeadState, Sight, centre_of, side_of
+from .sight import ANYWHERE_DEG, HeadState, Sight, centre_of, side_of
 from .sphere import angle_of_edges
 
 HALF_WIDTH, HALF_HEIGHT = 0.7, 0.9
@@ -37,6 +37,8 @@ RENEWED_DEG = 20.0
 """A patch that has turned by so much is taken anew; at 30 the mean error was a third larger."""
 CALM_S = 1.0
 """So calmly does the centre of a standing head follow its track, whose box jumps by a tenth of its width when a head turns."""
+UPRIGHT_DEG = 90.0
+"""No head nods or tilts by more: what is summed up to more is drift."""
 START_SIGMA_DEG = 2.0
 SIGMA_PER_TURN, SIGMA_PER_WAY, SIGMA_PER_FRAME_DEG = 0.1, 0.05, 0.25
 """Shares of the yaw (the radius is wrong for all of it) and of the way there and back; what a frame adds, as a random walk."""
@@ -98,7 +100,7 @@ class AffineHead:
     def _started(self, sight: Sight) -> Chain | None:
         """A chain that starts in this frame, where several sightings from the front agree; else none."""
         track = centre_of(sight.face)
-        agreed = self._initialiser.update(sight.face.frontal, track, sight.now_ns)
+        agreed = self._initialiser.update(frontal_of(sight), track, sight.now_ns)
         if agreed is None or self._is_elsewhere(sight, agreed):
             return None
         self._initialiser = Initialiser(self._config.initial_views)
@@ -190,12 +192,14 @@ class AffineHead:
 
     def _state(self, chain: Chain, now_ns: int) -> HeadState:
         longitude, latitude, roll = (float(angle) for angle in np.degrees(chain.angles))
-        if (now_ns - chain.matched_ns) * 1e-9 > self._config.hold_s:
+        sigma_deg = self._sigma_deg(chain, now_ns)
+        held = (now_ns - chain.matched_ns) * 1e-9 <= self._config.hold_s
+        if not held or sigma_deg > ANYWHERE_DEG or max(abs(latitude), abs(roll)) > UPRIGHT_DEG:
             return HeadState("lost")
         beyond_deg = min(self._config.range_deg, FARTHEST_DEG)
         if abs(longitude) > beyond_deg:
             return HeadState("out_of_range", side=side_of(longitude), beyond_deg=beyond_deg)
-        return HeadState("tracking", (longitude, -latitude, roll), self._sigma_deg(chain, now_ns))
+        return HeadState("tracking", (longitude, -latitude, roll), sigma_deg)
 
     def _sigma_deg(self, chain: Chain, now_ns: int) -> float:
         """Standard deviation of the yaw, degrees: a model of the start's error and of what the sum may have drifted by."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from deixis_runtime.settings import StageConfig
 from pydantic import Field
+
+SemiAxis = Annotated[float, Field(ge=0.04, le=0.15)]
+"""Half of a head's width, height or depth, metres: those of an infant's to those of a head with much hair."""
 
 
 class HeadposeConfig(StageConfig):
@@ -27,7 +30,7 @@ class HeadposeConfig(StageConfig):
 
     # The surface that carries the texture, within the outlines of anatomy.py: with 0.160 m a little narrower than the face
     # with its ears (FACE_WIDTH_M) and than the head with its hair (HEAD_WIDTH_M), neither of which turns with the surface.
-    head_semi_axes_m: tuple[float, float, float] = Field(
+    head_semi_axes_m: tuple[SemiAxis, SemiAxis, SemiAxis] = Field(
         default=(0.080, 0.115, 0.085), description="Semi-axes of the textured ellipsoid: across, up, along, metres."
     )
     surface_points: int = Field(default=600, ge=200, le=10000, description="Points spread over the whole ellipsoid.")

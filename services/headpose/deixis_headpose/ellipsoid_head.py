@@ -11,12 +11,12 @@ from deixis_schemas.messages import Side
 
 from .config import HeadposeConfig
 from .head import Array, Pose, Surface, facing_camera, rotation_of
-from .initialise import Initialiser, frontal_pose
+from .initialise import NEAREST_M, Initialiser, frontal_of, frontal_pose
 from .keyframes import Keyframes, take_keyframe
 from .lsm import Match, correlation, match, observe
 from .neck import Neck
 from .patch import Level, pyramid
-from .sight import HeadState, Sight, centre_of, side_of
+from .sight import ANYWHERE_DEG, HeadState, Sight, centre_of, side_of
 
 SAME_PLACE_M = 0.05
 """Head centres of the same head are this near."""
@@ -63,7 +63,7 @@ class EllipsoidHead:
     # --- start -----------------------------------------------------------------------------------------------------
 
     def _initialise(self, sight: Sight) -> HeadState:
-        agreed = self._initialiser.update(sight.face.frontal, centre_of(sight.face), sight.now_ns)
+        agreed = self._initialiser.update(frontal_of(sight), centre_of(sight.face), sight.now_ns)
         if agreed is None:
             return HeadState("initialising")
         pose = frontal_pose(agreed, sight.camera)
@@ -128,7 +128,10 @@ class EllipsoidHead:
         return starts[int(np.argmax(scores))]
 
     def _refine(self, levels: Sequence[Level], start: Pose, camera: Pinhole, neck: Neck, dt: float) -> Match:
-        """Match from the coarsest level to the finest, each with the keyframes nearest to the pose so far."""
+        """Match from the coarsest level to the finest, each with the keyframes nearest to the pose so far.
+
+        What ends up too near to the camera for a head is no match.
+        """
         found = Match(start, -1.0)
         for k in reversed(range(len(levels))):
             views = self._keyframes.nearest(found.pose, self._config.templates)
@@ -136,7 +139,7 @@ class EllipsoidHead:
             found = match(
                 levels[k], self._surface, templates, found.pose, camera, neck.prior(found.pose, dt), self._config.iterations
             )
-        return found
+        return found if found.pose.position_m[2] > NEAREST_M else Match(start, -1.0)
 
     def _levels(self, sight: Sight, pose: Pose) -> list[Level]:
         x, y, z = pose.position_m
@@ -171,13 +174,16 @@ class EllipsoidHead:
     def _state(self, held_s: float) -> HeadState:
         assert self._pose is not None
         angles = self._pose.angles_deg()
+        sigma_deg = yaw_sigma_deg(angles[0], self._correlation, held_s)
+        if sigma_deg > ANYWHERE_DEG:
+            return HeadState("lost")
         beyond_deg = min(self._config.range_deg, FARTHEST_DEG)
         if abs(angles[0]) > beyond_deg:
             # The back of a head carries little texture, and its yaw may pass 180: the side is the one it left to.
             self._gone = self._gone or side_of(angles[0])
             return HeadState("out_of_range", side=self._gone, beyond_deg=beyond_deg)
         self._gone = None
-        return HeadState("tracking", angles, yaw_sigma_deg(angles[0], self._correlation, held_s))
+        return HeadState("tracking", angles, sigma_deg)
 
 
 def yaw_sigma_deg(yaw_deg: float, correlation: float, held_s: float) -> float:

@@ -17,7 +17,7 @@ from .ellipsoid_head import EllipsoidHead
 from .head import ellipsoid
 from .regressed_head import RegressedHead
 from .regression import Regression
-from .sight import HeadState, Sight, centre_of
+from .sight import LEAST_FACE_PX, HeadState, Sight, centre_of
 
 
 class Head(Protocol):
@@ -82,7 +82,7 @@ class HeadPoseEstimator:
 
 def _largest_faces(tracks: Sequence[Track], count: int) -> list[Track]:
     """Face tracks of known persons, one each, largest first."""
-    faces = [t for t in tracks if t.kind == "face" and t.person_id is not None and min(t.bbox_px[2:]) >= 8]
+    faces = [t for t in tracks if t.kind == "face" and t.person_id is not None and min(t.bbox_px[2:]) >= LEAST_FACE_PX]
     faces.sort(key=lambda t: (-t.bbox_px[2] * t.bbox_px[3], t.track_id))
     by_person: dict[int | None, Track] = {}
     for face in faces:

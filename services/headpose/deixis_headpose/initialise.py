@@ -14,11 +14,14 @@ from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import FrontalFace, Point
 
 from .head import Array, Pose, facing_camera
+from .sight import LEAST_FACE_PX, Sight
 
 AGREE = np.array([0.144, 0.144, 0.12])
 """Sightings agree when their centre (x, y) and width differ by less than this, face widths."""
 REMEMBERED_S = 2.0
 """Older sightings say nothing of where the head is now."""
+NEAREST_M = 0.2
+"""No head is seen from so near: what seems to be is a face that is no face, or a lens that is not as it is told."""
 
 
 class Initialiser:
@@ -46,6 +49,14 @@ class Initialiser:
             return None
         x, y, width = (float(v) for v in seen[agree].mean(axis=0))
         return FrontalFace(centre_px=(centre_px[0] + x, centre_px[1] + y), width_px=width)
+
+
+def frontal_of(sight: Sight) -> FrontalFace | None:
+    """The face that the tracker saw from the front, where it is one that a head can have; else none."""
+    face = sight.face.frontal
+    if face is None or face.width_px < LEAST_FACE_PX or sight.camera.focal_px * FACE_WIDTH_M < NEAREST_M * face.width_px:
+        return None
+    return face
 
 
 def frontal_pose(face: FrontalFace, camera: Pinhole) -> Pose:

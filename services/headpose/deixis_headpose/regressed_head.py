@@ -63,6 +63,7 @@ class RegressedHead:
         self._reader = HeadReader(regression)
         self._calibration, self._motion = calibration, motion
         self._turn: TurnFilter | None = None
+        self._lost = False
         self._lasting: Array = np.zeros(3)
         self._seen_ns = 0
         self._told_ns = 0
@@ -78,11 +79,12 @@ class RegressedHead:
             return self._unseen(now_ns)
         passing, self._lasting = self._calibration.variances(look)
         angles = np.array(angles_of(look))
-        if self._turn is None or now_ns - self._seen_ns > self._config.hold_s * 1e9:
+        if self._turn is None or self._lost:
             self._turn = TurnFilter(angles, passing, self._motion)
         else:
             self._turn.predict((now_ns - self._told_ns) * 1e-9)
             self._turn.update(angles, passing)
+        self._lost = False
         self._seen_ns = self._told_ns = now_ns
         return self._state(self._turn)
 
@@ -90,7 +92,8 @@ class RegressedHead:
         """No head was seen: the last angles for a while, their sigma growing."""
         if self._turn is None:
             return HeadState("initialising")
-        if now_ns - self._seen_ns > self._config.hold_s * 1e9:
+        self._lost = now_ns - self._seen_ns > self._config.hold_s * 1e9
+        if self._lost:
             return HeadState("lost")
         self._turn.predict((now_ns - self._told_ns) * 1e-9)
         self._told_ns = now_ns

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
-from collections.abc import Iterable
-
 import cv2
 from deixis_runtime.camera_lens import CameraLens
 from deixis_runtime.images import ImageError, decode_image
 from deixis_runtime.lens import Lens
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
-from deixis_schemas.messages import Frame, FrameId, HeadPoses, Tracks
+from deixis_schemas.messages import Frame, HeadPoses, Tracks
 
 from .config import HeadposeConfig
 from .estimator import HeadPoseEstimator
+from .joining import FrameJoiner
 
 
 def serve(node: Node, config: HeadposeConfig) -> None:
@@ -30,55 +28,31 @@ def serve(node: Node, config: HeadposeConfig) -> None:
     while node.wait():
         joiner.add_frames(frames.take_all())
         joiner.add_tracks(tracks.take_all())
-        lens.hear(infos.take_all())  # after taking the frames: what the camera said before one of them is then here
-        node.note("lens", lens.note)
+        for why in lens.hear(infos.take_all()):  # after taking the frames: what the camera said before one of them is then here
+            node.count("lenses_refused")
+            node.warn("lens", f"{infos.key}: not used: {why}")
         pair = joiner.take()
-        if pair is None:
-            continue
-        frame = pair[0]
-        with node.step():
-            out.put(_poses(node, estimator, lens.of_frame(frame.width, frame.height), *pair))
+        if pair is not None:
+            frame = pair[0]
+            with node.step():
+                out.put(_poses(node, estimator, lens.of_frame(frame.width, frame.height), *pair))
+        for name, count in joiner.take_dropped().items():
+            node.count(name, count)
+        node.note("lens", lens.note)
+        unjoined = unjoined_reason(joiner, node.robot, config.frames_kept)
+        node.set_state("degraded" if unjoined else "ok", unjoined or "")
 
 
-class FrameJoiner:
-    """Keeps the last few frames and the last few tracks, and gives the newest pair of the same run and `seq`.
-
-    A pair is given once, and never one that is older than one already given, except from a camera that started anew.
-    """
-
-    def __init__(self, kept: int) -> None:
-        self._kept = kept
-        self._frames: OrderedDict[FrameId, Frame] = OrderedDict()
-        self._waiting: deque[Tracks] = deque(maxlen=kept)
-
-    def add_frames(self, frames: Iterable[Frame]) -> None:
-        """Keep frames, in the order they came; the oldest go."""
-        for frame in frames:
-            self._frames[frame.frame_id] = frame
-            self._frames.move_to_end(frame.frame_id)
-            while len(self._frames) > self._kept:
-                self._frames.popitem(last=False)
-
-    def add_tracks(self, tracks: Iterable[Tracks]) -> None:
-        """Keep tracks, in the order they came; either of frame and tracks may come first."""
-        self._waiting.extend(tracks)
-
-    def take(self) -> tuple[Frame, Tracks] | None:
-        """The newest tracks whose frame is held, with that frame; what came before them is dropped. None: no pair yet."""
-        for index in reversed(range(len(self._waiting))):
-            tracks = self._waiting[index]
-            frame = self._frames.get(tracks.frame_id)
-            if frame is not None:
-                self._drop_up_to(index, tracks.frame_id)
-                return frame, tracks
+def unjoined_reason(joiner: FrameJoiner, robot: str, frames_kept: int) -> str | None:
+    """Why tracks that come are not answered, with the keys; none while they are."""
+    tracks, newest = joiner.unjoined, joiner.newest_frame
+    if tracks is None:
         return None
-
-    def _drop_up_to(self, index: int, frame_id: FrameId) -> None:
-        for _ in range(index + 1):
-            self._waiting.popleft()
-        while next(iter(self._frames)) != frame_id:
-            self._frames.popitem(last=False)
-        del self._frames[frame_id]
+    frames_key, who = topics.FRAME.key(robot), f"{topics.TRACKS.key(robot)} by {tracks.stage}/{tracks.instance}"
+    if joiner.came(tracks.frame_id):
+        return f"{who} comes when its frame is no longer among the last {frames_kept} (frames_kept) of {frames_key}"
+    last = f"the last is seq {newest.seq} of run {newest.run}" if newest else "none has come"
+    return f"{who} speaks of seq {tracks.seq} of run {tracks.run}, which is no frame of {frames_key}: {last}"
 
 
 def _poses(node: Node, estimator: HeadPoseEstimator, lens: Lens, frame: Frame, tracks: Tracks) -> HeadPoses:
@@ -87,13 +61,14 @@ def _poses(node: Node, estimator: HeadPoseEstimator, lens: Lens, frame: Frame, t
         image = decode_image(frame)
     except ImageError as error:
         node.count("frames_unreadable")
-        node.warn("unreadable frame", f"frame {frame.seq} of {frame.stage}/{frame.instance}: {error}")
+        key = topics.FRAME.key(node.robot)
+        node.warn("unreadable frame", f"{key}: frame {frame.seq} of {frame.stage}/{frame.instance}: {error}")
         return HeadPoses.derive(frame, node.producer, poses=[])
     if (tracks.width, tracks.height) != (frame.width, frame.height):
         node.count("tracks_of_other_size")
         node.warn(
             "tracks of other size",
-            f"tracks of {tracks.stage}/{tracks.instance} speak of {tracks.width} x {tracks.height}, "
+            f"{topics.TRACKS.key(node.robot)}: {tracks.stage}/{tracks.instance} speaks of {tracks.width} x {tracks.height}, "
             f"frame {frame.seq} is {frame.width} x {frame.height}",
         )
         return HeadPoses.derive(frame, node.producer, poses=[])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,6 +11,11 @@ import numpy as np
 from deixis_runtime.lens import Pinhole
 from deixis_schemas.messages import HeadPose, Point, PoseStatus, Side, Track
 from numpy.typing import NDArray
+
+LEAST_FACE_PX = 8.0
+"""Narrower faces show nothing to read."""
+ANYWHERE_DEG = 360 / math.sqrt(12)
+"""Standard deviation of an angle of which nothing is known: a head whose pose is no surer is lost."""
 
 
 class Sight(NamedTuple):

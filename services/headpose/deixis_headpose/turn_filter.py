@@ -16,7 +16,7 @@ RATE_FADES_S = 0.15
 """A turn that is not seen to go on dies away with this time constant."""
 FIRST_RATE_DEG_S = 60.0
 """Spread of the rate at which a head is first seen turning."""
-STEP_S = (1e-3, 0.5)
+STEP_S = (1e-3, 10.0)
 """Looks nearer and farther apart than this are taken as if they were this far apart."""
 
 
