@@ -80,9 +80,3 @@ class StubNode:
         self._now.pop(key, None)
         if text is not None:
             self._now[key] = text
-
-    def set_state(self, state: HealthState, reason: str = "") -> None:
-        self._state = (state, reason)
-
-    def count(self, name: str, n: int = 1) -> None:
-        self.counters[name] += n
