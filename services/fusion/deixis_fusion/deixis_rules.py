@@ -126,8 +126,8 @@ def _regions(
     All POIs, where none of the regions with POIs can have shown this gesture.
     """
     size = np.abs(bearings)
-    beside = (size >= config.min_deg) & (size <= config.max_deg)
-    regions: dict[Region, Flags] = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
+    beside, left = (size >= config.min_deg) & (size <= config.max_deg), bearings > 0
+    regions: dict[Region, Flags] = {"left": beside & left, "center": ~beside, "right": beside & ~left}
     count = len(bearings)
     weights = [
         (flags, confusion.share(hand.gesture, name) * np.count_nonzero(flags) / count) for name, flags in regions.items()

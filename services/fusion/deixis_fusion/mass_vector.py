@@ -7,7 +7,7 @@ single POIs, on the three regions of eq. 16, on nested sets and on the whole fra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -27,7 +27,7 @@ Sets = list[tuple[Flags, float]]
 class Focal(NamedTuple):
     """A set with mass: its members and the mass."""
 
-    members: Indices
+    members: Indices | tuple[int]
     mass: float
 
 
@@ -105,15 +105,15 @@ class MassVector:
 
     def largest(self, count: int) -> list[Focal]:
         """The sets of largest mass, single hypotheses among them."""
-        single, masses = self.single, self.masses.tolist()
+        single = self.single
+        best: Sequence[int] = range(len(single))
         if len(single) > count:
             candidates = (single >= np.partition(single, -count)[-count]).nonzero()[0]
-        else:
-            candidates = np.arange(len(single))
-        best = candidates[(-single[candidates]).argsort(kind="stable")[:count]]
-        alone = zip(best.tolist(), single[best].tolist(), strict=True)
-        found = [(-mass, 1, i, best[k : k + 1]) for k, (i, mass) in enumerate(alone)]
-        for flags, mass in zip(self.members, masses, strict=True):
+            best = candidates[(-single[candidates]).argsort(kind="stable")[:count]].tolist()
+            single = single[best]
+        found: list[tuple[float, int, int, Indices | tuple[int]]]
+        found = [(-mass, 1, i, (i,)) for i, mass in zip(best, single.tolist(), strict=True)]
+        for flags, mass in zip(self.members, self.masses.tolist(), strict=True):
             named = flags.nonzero()[0]
             found.append((-mass, len(named), int(named[0]), named))
         found.sort(key=itemgetter(0, 1, 2))
