@@ -178,7 +178,8 @@ class Frames:
 
     def column(self, name: str) -> Values:
         """One of the numbers, of each frame (n); not a number where a frame does not tell."""
-        return self.table[ROW[name]]
+        column: Values = self.table[ROW[name]]
+        return column
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -203,8 +204,10 @@ class Frames:
         if axis_deg is None:
             return np.zeros(len(self))
         last_deg = self.log.axis_deg
-        turns: Values = self.column("axis_deg") - (last_deg + wrapped_deg(axis_deg - last_deg))
-        return turns if len(self.log.walk) == len(self.log) else np.where(np.isnan(turns), 0.0, turns)
+        turns: Values = self.table[ROW["axis_deg"]] - (last_deg + wrapped_deg(axis_deg - last_deg))
+        if len(self.log.walk) < len(self.log):
+            turns[np.isnan(turns)] = 0.0
+        return turns
 
 
 def wrapped(angles_deg: Values) -> Values:
