@@ -105,7 +105,7 @@ def bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:
 
 def _blurred(told: Values, sigma_deg: float) -> Curve:
     """The stage's own likelihood of bearings -180, -175 ... 175 as a density, blurred by a normal distribution."""
-    return np.asarray(_blur(sigma_deg) @ (told / (told.sum() * BEARING_STEP_DEG)))
+    return np.asarray(_blur(sigma_deg) @ (told / (np.add.reduce(told) * BEARING_STEP_DEG)))
 
 
 @lru_cache(maxsize=4)

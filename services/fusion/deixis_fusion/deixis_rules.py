@@ -86,15 +86,17 @@ class DeixisRules:
 
 def likeliest(chances: Values, tie_ratio: float) -> tuple[int, ...]:
     """The hypotheses that are at least `tie_ratio` times as likely as the likeliest, best first."""
-    tied = np.flatnonzero(chances >= tie_ratio * chances.max())
-    return tuple(int(i) for i in tied[np.argsort(-chances[tied], kind="stable")])
+    (tied,) = (chances >= tie_ratio * np.maximum.reduce(chances)).nonzero()
+    return tuple(tied[(-chances[tied]).argsort(kind="stable")].tolist())
 
 
 def _tells(likelihoods: Values, observed: HandObservation | HeadObservation | None) -> bool:
     """Whether a source tells POIs apart; whether a lone one is what was meant, tells how well it fits."""
     if observed is None:
         return False
-    return len(likelihoods) == 1 or float(likelihoods.min()) < (1 - TOLD) * float(likelihoods.max())
+    if len(likelihoods) == 1:
+        return True
+    return bool(np.minimum.reduce(likelihoods) < (1 - TOLD) * np.maximum.reduce(likelihoods))
 
 
 # --- masses, to explain by ---------------------------------------------------------------------------------------------
@@ -114,7 +116,7 @@ def hand_masses(
     total = sum(weight for _, weight in regions)
     sets = [(flags, of_regions * weight / total) for flags, weight in regions]
     everything = np.ones(len(likelihoods), dtype=np.bool_)
-    single = of_single / max(LEAST, float(likelihoods.sum())) * likelihoods
+    single = of_single / max(LEAST, float(np.add.reduce(likelihoods))) * likelihoods
     return MassVector.normalised(single, [*sets, (everything, config.discount)])
 
 
@@ -145,7 +147,7 @@ def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config
     if head.yaw_deg is None:
         return _out_of_range(told, floor).discounted(config.discount)
     single = told / len(told)
-    kept = (1 - config.discount) / max(LEAST, float(single.sum()) + floor)
+    kept = (1 - config.discount) / max(LEAST, float(np.add.reduce(single)) + floor)
     everything = np.ones(len(told), dtype=np.bool_)
     return MassVector.normalised(kept * single, [(everything, kept * floor + config.discount)])
 

@@ -50,9 +50,8 @@ class Sample:
         """The pointing gesture of a stroke; none in other phases and for other gestures."""
         if self.gesture is None or self.gesture.phase != "stroke":
             return None
-        return next((kind for kind in POINTING if kind == self.gesture.gesture), None)
+        return self.gesture.gesture if self.gesture.gesture in POINTING else None
 
-    @cached_property
     def row(self) -> bytes:
         """What the frame shows in numbers: `ROW`, packed."""
         shown = *self._hand_shown(), *self._head_shown()
@@ -102,7 +101,6 @@ class Sample:
         """A stroke of an open hand, a wave and the like."""
         return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
 
-    @cached_property
     def curve(self) -> bytes:
         """The gesture stage's likelihood of bearings, packed as `row`; empty where it does not tell it."""
         told = self.gesture.bearing_likelihood if self.gesture is not None else ()

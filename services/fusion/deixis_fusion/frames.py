@@ -52,11 +52,12 @@ class FrameLog(Sequence[Sample]):
         if count == len(self._curves):
             self._columns = np.concatenate([self._columns, np.empty_like(self._columns)], axis=1)
             self._curves = np.concatenate([self._curves, np.empty_like(self._curves)])
-        self._columns[:, count] = np.frombuffer(sample.row)
+        self._columns[:, count] = np.frombuffer(sample.row())
         if self.walk and sample.place is not None:
             # On from the last one: a turn is small then, wherever the circle is cut.
             self._columns[_AXIS, count] = self.axis_deg + wrapped_deg(sample.place.axis_deg - self.axis_deg)
-        self._curves[count] = np.frombuffer(sample.curve) if sample.curve else 0.0
+        curve = sample.curve()
+        self._curves[count] = np.frombuffer(curve) if curve else 0.0
         self._add(sample)
 
     def only(self, kept: Flags) -> FrameLog:

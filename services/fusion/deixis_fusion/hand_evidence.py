@@ -99,11 +99,11 @@ def mean_curve(weights: Values, curves: Values, turns_deg: Values) -> tuple[floa
     `turns_deg` (n) is added to the bearings of each; between its values a curve goes on a line. Those that turn by as many
     steps are summed before they are turned.
     """
-    total = float(weights.sum())
+    total = float(np.add.reduce(weights))
     if not total:
         return ()
     steps = np.rint(turns_deg / SAME_AXIS_DEG) * (SAME_AXIS_DEG / -BEARING_STEP_DEG)
-    whole = np.arange(math.floor(steps.min()), math.floor(steps.max()) + 2)
+    whole = np.arange(math.floor(np.minimum.reduce(steps)), math.floor(np.maximum.reduce(steps)) + 2)
     shares = np.maximum(0.0, 1 - np.abs(steps - whole[:, None]))
     mean = (shares * (weights / total)) @ curves
     turned = [np.concatenate([of[by:], of[:by]]) for of, by in zip(mean, (whole % BEARINGS).tolist(), strict=True)]

@@ -75,7 +75,7 @@ class MassVector:
     @cached_property
     def sizes(self) -> Indices:
         """How many members each of the larger sets has (k)."""
-        return np.asarray(self.members.sum(axis=1))
+        return np.asarray(np.add.reduce(self.members, axis=1))
 
     @cached_property
     def unknown(self) -> float:
@@ -155,7 +155,7 @@ def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector,
     """These weights with equal sets added up, and their total. Sets without a member, or without weight, go."""
     larger: dict[bytes, float] = {}
     rows = []
-    for i, (size, weight) in enumerate(zip(sets.sum(axis=1).tolist(), weights.tolist(), strict=True)):
+    for i, (size, weight) in enumerate(zip(np.add.reduce(sets, axis=1).tolist(), weights.tolist(), strict=True)):
         if size == 1:
             single = single + weight * sets[i]
         elif size and weight > 0:
@@ -164,4 +164,4 @@ def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector,
                 rows.append(i)
             larger[key] = larger.get(key, 0.0) + weight
     members = sets if len(rows) == len(sets) else sets[rows]
-    return MassVector(single, members, np.array([*larger.values()])), float(single.sum()) + sum(larger.values())
+    return MassVector(single, members, np.array([*larger.values()])), float(np.add.reduce(single)) + sum(larger.values())

@@ -82,14 +82,17 @@ def medians(values: Values, early: int = 0) -> list[float]:
 
     The first `early` columns count for less.
     """
-    late = np.sort(values[:, early:], axis=1)
-    first = np.sort(values[:, :early], axis=1).tolist()
-    if np.isnan(values).any():
+    ordered = values.copy()
+    late, first = ordered[:, early:], ordered[:, :early]
+    late.sort(axis=1)
+    first.sort(axis=1)
+    # What is not a number comes last.
+    if np.isnan(ordered[:, -1:]).any() or np.isnan(first).any():
         unknown = np.isnan(late).sum(axis=1).tolist()
-        known = [[value for value in few if not math.isnan(value)] for few in first]
+        known = [[value for value in few if not math.isnan(value)] for few in first.tolist()]
         each = zip(late, unknown, known, strict=True)
         return [_medians(row[None, : len(row) - gone], [few])[0] for row, gone, few in each]
-    return _medians(late, first)
+    return _medians(late, first.tolist())
 
 
 def _medians(late: Values, early: list[list[float]]) -> list[float]:

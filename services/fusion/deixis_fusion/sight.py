@@ -181,13 +181,15 @@ class Lookout:
         """What is in sight from there."""
         eye = (place.position_m[0], place.position_m[1])
         same = self._kept is not None and self._kept[0] is points and self._kept[1] is walls
-        if not same or math.dist(eye, self._eye) > HELD_M:
+        if not same or (len(walls) and math.dist(eye, self._eye) > HELD_M):
             hidden = walls.hide(eye, points.xy, self._clearance_m, points.extent / 2 + self._clearance_m)
             in_sight = np.flatnonzero(~hidden)
-            if not same or len(self._bearings) > KEPT_PLACES or not np.array_equal(in_sight, self._index):
+            if not same or not np.array_equal(in_sight, self._index):
                 self._bearings = {}
             self._hidden, self._index = np.flatnonzero(hidden), in_sight
             self._kept, self._eye = (points, walls), eye
+        if len(self._bearings) > KEPT_PLACES:
+            self._bearings = {}
         return Sight(bearings_from(place, points, self._index), points, self._index, place, self._bearings)
 
 

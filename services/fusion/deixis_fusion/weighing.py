@@ -25,6 +25,8 @@ NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 4096
 MANY = 500
+# The method of arrays takes twice as long for as few as there mostly are.
+_largest = np.maximum.reduce
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +51,13 @@ class Weighing:
 
         The conflict of Dempster's rule says little: .5 with 20 POIs in perfect agreement, .85 in contradiction.
         """
-        most = float(self.hand.max() * self.head.max())
-        return 1 - float((self.hand * self.head).max()) / most if most > 0 else 1.0
+        most = float(_largest(self.hand) * _largest(self.head))
+        return 1 - float(_largest(self.hand * self.head)) / most if most > 0 else 1.0
 
     def chances(self, tempering: float) -> Values:
         """The probability of each POI, all alike beforehand: the joint likelihood to the power of `tempering`, summing to 1."""
-        weights = (self.joint / self.joint.max()) ** tempering
-        return np.asarray(weights / weights.sum())
+        weights = (self.joint / _largest(self.joint)) ** tempering
+        return np.asarray(weights / np.add.reduce(weights))
 
 
 class SourceCurves:
@@ -97,8 +99,8 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
         found[:, part] = _part(stacked, seen.cases_from(places, part, count))
     by_name = dict(zip((*names, "joint", "most"), found, strict=True))
     hand, head = (by_name[name] if name in names else np.ones(len(seen)) for name in ("hand", "head"))
-    best = math.prod(stacked.max(axis=2).ravel().tolist())
-    floor = math.prod(stacked[-1].min(axis=1).tolist()) if "head" in names else 1.0
+    best = math.prod(_largest(stacked, axis=2).ravel().tolist())
+    floor = math.prod(np.minimum.reduce(stacked[-1], axis=1).tolist()) if "head" in names else 1.0
     weighed = Weighing(hand, head, by_name["joint"], by_name["most"] / best, floor)
     return _with_height(weighed, evidence, seen, curves)
 
@@ -151,7 +153,7 @@ def _part(told: Values, cases: Singles) -> Values:
     of_sources = np.multiply.reduce(at(told, cases), axis=1)
     joint = np.multiply.reduce(of_sources, axis=0)
     each = np.concatenate([of_sources, joint[None]])
-    return np.concatenate([np.add.reduce(each, axis=1) / np.float32(each.shape[1]), joint.max(axis=0)[None]])
+    return np.concatenate([np.add.reduce(each, axis=1) / np.float32(each.shape[1]), _largest(joint)[None]])
 
 
 def _told(evidence: Evidence, views: Sequence[View], curves: SourceCurves) -> tuple[list[str], Values]:
