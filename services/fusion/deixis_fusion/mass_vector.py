@@ -43,9 +43,14 @@ class MassVector:
     def normalised(single: Values, sets: Iterable[tuple[Flags, float]] = ()) -> MassVector:
         """The assignment proportional to these weights; vacuous where all are 0. Equal sets are added up."""
         flags, weights = tuple(zip(*sets, strict=True)) or ((), ())
-        return _normalised(
-            single, np.array(flags, dtype=np.bool_).reshape(-1, len(single)), np.array(weights, dtype=np.float64)
-        )
+        sets_flags = np.array(flags, dtype=np.bool_).reshape(-1, len(single))
+        return MassVector.weighed(single, sets_flags, np.array(weights, dtype=np.float64))
+
+    @staticmethod
+    def weighed(single: Values, sets: Flags, weights: Values) -> MassVector:
+        """The same of sets as flags (k, n) with their weights (k)."""
+        gathered, total = _gathered(single, sets, weights)
+        return gathered.divided(total) if total > 0 and math.isfinite(total) else MassVector.vacuous(len(single))
 
     @staticmethod
     def vacuous(size: int) -> MassVector:
@@ -101,7 +106,7 @@ class MassVector:
         """Shafer's discounting: keep 1 - rate of every mass, give `rate` to the whole frame."""
         everything = np.ones((1, self.size), dtype=np.bool_)
         sets, masses = np.concatenate([self.members, everything]), np.append(self.masses * (1 - rate), rate)
-        return _normalised(self.single * (1 - rate), sets, masses)
+        return MassVector.weighed(self.single * (1 - rate), sets, masses)
 
     def largest(self, count: int) -> list[Focal]:
         """The sets of largest mass, single hypotheses among them."""
@@ -143,12 +148,6 @@ def combine(first: MassVector, second: MassVector) -> Combined:
     if agreement < TOTAL_CONFLICT:
         return Combined(MassVector.vacuous(first.size), 1.0)
     return Combined(joint.divided(agreement), min(1.0, max(0.0, 1.0 - agreement)))
-
-
-def _normalised(single: Values, sets: Flags, weights: Values) -> MassVector:
-    """See `MassVector.normalised`; the sets as flags (k, n)."""
-    gathered, total = _gathered(single, sets, weights)
-    return gathered.divided(total) if total > 0 and math.isfinite(total) else MassVector.vacuous(len(single))
 
 
 def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector, float]:

@@ -207,9 +207,8 @@ class _Turned(NamedTuple):
     @staticmethod
     def of(places: Sequence[PersonPlace], points: Points, index: Indices) -> _Turned:
         """These POIs for persons there."""
-        of_places = np.array([_axis(place) for place in places]).T
-        camera_x, camera_y, cos, sin, distance = of_places[:, :, None]
-        x, y = points.xyz[index, :2].T
+        camera_x, camera_y, cos, sin, distance = np.array([_axis(place) for place in places]).T[:, :, None]
+        x, y, _ = points.xyz[index].T
         x, y = x - camera_x, y - camera_y
         ahead, left = cos * x + sin * y, cos * y - sin * x
         away = np.hypot(ahead + distance, left)

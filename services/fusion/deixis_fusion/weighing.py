@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -101,8 +101,14 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
     hand, head = (by_name[name] if name in names else np.ones(len(seen)) for name in ("hand", "head"))
     best = math.prod(_largest(stacked, axis=2).ravel().tolist())
     floor = math.prod(np.minimum.reduce(stacked[-1], axis=1).tolist()) if "head" in names else 1.0
-    weighed = Weighing(hand, head, by_name["joint"], by_name["most"] / best, floor)
-    return _with_height(weighed, evidence, seen, curves)
+    joint, fit = by_name["joint"], by_name["most"] / best
+    # How well a POI fits is about directions: a height that is wrong makes no POI one that nobody can have meant.
+    hand_high, head_high = _heights(evidence, seen, curves)
+    if hand_high is not None:
+        hand, joint = hand * hand_high, joint * hand_high
+    if head_high is not None:
+        head, joint, floor = head * head_high, joint * head_high, floor * float(np.minimum.reduce(head_high))
+    return Weighing(hand, head, joint, fit, floor)
 
 
 def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices | slice, int]]:
@@ -124,25 +130,18 @@ def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices
             yield which[start : start + at_a_time], count
 
 
-def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
-    """The same with how high hand and head go, where that was measured and from one place (`height.py`).
-
-    How well a POI fits is about directions: a height that is wrong makes no POI one that nobody can have meant.
-    """
+def _heights(evidence: Evidence, seen: Sight, curves: SourceCurves) -> tuple[Values | None, Values | None]:
+    """The likelihoods of how high hand and head go (n each), where that was measured and from one place (`height.py`)."""
     hand, head = evidence.hand, evidence.head
     by_hand = hand is not None and hand.elevation_deg is not None
     by_head = head is not None and head.pitch_deg is not None
     if not (by_hand or by_head) or evidence.views or seen.place is None:
-        return weighed
+        return None, None
     heights = Heights.of(seen.place, seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen])
-    of_hand = hand_likelihoods(hand, heights, curves.hand_config) if hand is not None else None
-    if of_hand is not None:
-        weighed = replace(weighed, hand=weighed.hand * of_hand, joint=weighed.joint * of_hand)
-    of_head = head_likelihoods(head, seen.place, heights, curves.head_config) if head is not None else None
-    if of_head is not None:
-        floor = weighed.head_floor * float(of_head.min())
-        weighed = replace(weighed, head=weighed.head * of_head, joint=weighed.joint * of_head, head_floor=floor)
-    return weighed
+    return (
+        hand_likelihoods(hand, heights, curves.hand_config) if hand is not None else None,
+        head_likelihoods(head, seen.place, heights, curves.head_config) if head is not None else None,
+    )
 
 
 def _part(told: Values, cases: Singles) -> Values:
@@ -150,7 +149,8 @@ def _part(told: Values, cases: Singles) -> Values:
 
     `told` are the sources' curves in v views (s, v, 360).
     """
-    of_sources = np.multiply.reduce(at(told, cases), axis=1)
+    of_views = at(told, cases)
+    of_sources = np.multiply.reduce(of_views, axis=1) if told.shape[1] > 1 else of_views[:, 0]
     joint = np.multiply.reduce(of_sources, axis=0)
     each = np.concatenate([of_sources, joint[None]])
     return np.concatenate([np.add.reduce(each, axis=1) / np.float32(each.shape[1]), _largest(joint)[None]])
