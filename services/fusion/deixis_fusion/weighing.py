@@ -152,8 +152,8 @@ def _part(told: Values, cases: Singles) -> Values:
     of_views = at(told, cases)
     of_sources = np.multiply.reduce(of_views, axis=1) if told.shape[1] > 1 else of_views[:, 0]
     joint = np.multiply.reduce(of_sources, axis=0)
-    each = np.concatenate([of_sources, joint[None]])
-    return np.concatenate([np.add.reduce(each, axis=1) / np.float32(each.shape[1]), _largest(joint)[None]])
+    sums = np.concatenate([np.add.reduce(of_sources, axis=1), np.add.reduce(joint)[None]])
+    return np.concatenate([sums / np.float32(len(joint)), _largest(joint)[None]])
 
 
 def _told(evidence: Evidence, views: Sequence[View], curves: SourceCurves) -> tuple[list[str], Values]:
