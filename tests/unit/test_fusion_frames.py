@@ -171,3 +171,18 @@ def test_of_a_frame_it_is_known_what_it_shows_and_what_it_does_not() -> None:
     assert frames.totals()["frame"] == 1
     assert sum(frames.totals().values()) == 1
     assert np.isnan(frames.table[ROW["bearing_deg"] : ROW["at_ns"], 0]).all()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_as_many_frames_for_either_are_a_tie_whatever_rounding_makes_of_their_sums(seed: int) -> None:
+    dice = np.random.default_rng(seed)
+    early, late = 2 * int(dice.integers(0, 8)), 2 * int(dice.integers(1, 90))
+    seen = [HeadPose(person_id=1, status="tracking", yaw_deg=20, yaw_sigma_deg=3), HeadPose(person_id=1, status="out_of_range")]
+    sides = [Gesture(person_id=1, phase="stroke", gesture=kind, hand="left") for kind in ("point_left", "point_right")]
+    halves = np.concatenate([dice.permutation(np.arange(count) % 2) for count in (early, late)])
+    samples = [Sample(i, i, sides[half], seen[half]) for i, half in enumerate(halves)]
+    hand, head = shown_over(Frames.of(samples, early))
+    assert hand is not None
+    assert hand.gesture == "point_left"
+    assert head is not None
+    assert head.yaw_deg == 20

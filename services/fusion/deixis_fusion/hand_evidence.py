@@ -10,7 +10,7 @@ import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
 from .evidence import HANDS, HandObservation
-from .frames import Flags, Frames, Values
+from .frames import ROUNDING, Flags, Frames, Values
 from .pointing import PointingGesture
 from .robust import Middle, middles_of
 
@@ -34,8 +34,8 @@ def vote(frames: Frames, totals: Mapping[str, float]) -> Vote | None:
     pointing = beside + totals["invisible"]
     if not pointing:
         return None
-    directed: PointingGesture = "point_left" if totals["point_left"] >= totals["point_right"] else "point_right"
-    if totals[directed] >= DIRECTED_SHARE * pointing:
+    directed: PointingGesture = "point_left" if totals["point_left"] >= totals["point_right"] - ROUNDING else "point_right"
+    if totals[directed] >= DIRECTED_SHARE * pointing - ROUNDING:
         own = None if totals[directed] == totals["frame"] else frames.show(directed)
         return Vote(directed, totals[directed] / beside, own)
     shown = frames.show("point_left") | frames.show("point_right") | frames.show("invisible")
@@ -90,7 +90,7 @@ class HandFrames:
 def _is_mirrored(mirrored: Values, weights: Values) -> bool:
     """Whether most frames with a bearing say that it may as well lie behind; of as many, whether the first of them does."""
     more = float((2 * mirrored - 1) @ weights)
-    return more > 0 or (more == 0 and bool(mirrored[weights > 0][:1].any()))
+    return more > ROUNDING or (more > -ROUNDING and bool(mirrored[weights > 0][:1].any()))
 
 
 def mean_curve(weights: Values, curves: Values, turns_deg: Values) -> tuple[float, ...]:

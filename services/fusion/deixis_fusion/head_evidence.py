@@ -9,7 +9,7 @@ import numpy as np
 from deixis_schemas.messages import HeadPose
 
 from .evidence import TURNED, HeadObservation
-from .frames import Frames, Values
+from .frames import ROUNDING, Frames, Values
 from .robust import Middle, medians
 
 LEAST_HEAD_SHARE = 0.2
@@ -39,14 +39,14 @@ class HeadFrames:
             tracking = frames.show("tracking")
             measured[:, ~tracking] = np.nan
             totals = frames.totals(frames.weights * tracking)
-        self._has_pitch = totals["has_pitch"] >= totals["tracking"] / 2
+        self._has_pitch = totals["has_pitch"] >= totals["tracking"] / 2 - ROUNDING
         measured[0] += turns_deg
 
     def observed(self, middle: Middle) -> HeadObservation | None:
         """What they show together; none where the head was tracked in too few frames to tell."""
-        if self._tracked + self._beyond < LEAST_HEAD_SHARE:
+        if self._tracked + self._beyond < LEAST_HEAD_SHARE - ROUNDING:
             return None
-        if self._beyond > self._tracked:
+        if self._beyond > self._tracked + ROUNDING:
             return _out_of_range(self._frames, self._beyond)
         yaw, sigma, pitch, pitch_sigma = middle
         if not self._has_pitch:
