@@ -20,6 +20,7 @@ from deixis_runtime.settings import checked_name
 from deixis_runtime.site import SiteError
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Poi
+from deixis_schemas.plain_text import shown, steers
 
 from .gets import get_all, get_pois
 from .options import CommandError, add_connect, add_json, add_robot
@@ -204,9 +205,11 @@ def who() -> str:
 
 
 def _plain(text: str) -> str:
-    """A name without what parts a selector's parameters."""
-    if not text or len(text) > MAX_BY or any(mark in text for mark in ";&|=?#"):
-        raise argparse.ArgumentTypeError(f"'{text[:80]}' is no name of up to {MAX_BY} characters without ; & | = ? #")
+    """A name without what parts a selector's parameters, or steers a terminal."""
+    if not text or len(text) > MAX_BY or any(mark in ";&|=?#" or steers(mark) for mark in text):
+        raise argparse.ArgumentTypeError(
+            f"'{shown(text[:80])}' is no name of up to {MAX_BY} plain characters without ; & | = ? #"
+        )
     return text
 
 

@@ -16,6 +16,7 @@ from deixis_schemas.codec import say
 from deixis_schemas.messages import Metre
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from .pgm import PgmError, Picture, is_pgm, read_pgm
 from .site import Site, SiteError, WallLine, read_yaml
 
 MAX_MAP_SIDE = 16_384
@@ -88,33 +89,41 @@ def _in_map(cell: tuple[int, int], height: int, described: MapFile) -> tuple[flo
     return x + right * cos - up * sin, y + right * sin + up * cos
 
 
-def _occupied(picture: Mask, described: MapFile) -> Mask:
-    values = picture.astype(np.float64)
+def _occupied(picture: Picture, described: MapFile) -> Mask:
+    # As `map_server` does: whatever the picture's largest value is, that is white.
+    values = np.arange(picture.most + 1) * (255 / picture.most)
     if described.mode == "raw":
         # Percent as they are; above 100 nothing is known.
-        probability = np.where(values <= 100, values / 100, 0.0)
+        probability = np.where(np.rint(values) <= 100, np.rint(values) / 100, 0.0)
     else:
         probability = (values if described.negate else 255 - values) / 255
-    return np.asarray(probability > described.occupied_thresh, dtype=np.uint8)
+    return np.asarray((probability > described.occupied_thresh).astype(np.uint8)[picture.cells])
 
 
-def _picture(path: Path, image: Path) -> Mask:
+def _picture(path: Path, image: Path) -> Picture:
     try:
         if image.stat().st_size > MAX_PICTURE_BYTES:
             raise SiteError(f"map {path}: image: {image} is larger than {MAX_PICTURE_BYTES} bytes")
-        packed = np.frombuffer(image.read_bytes(), np.uint8)
+        packed = image.read_bytes()
     except OSError as error:
         raise SiteError(f"map {path}: image: {image}: {error.strerror}") from None
-    picture: Any = _decoded(packed)
+    try:
+        picture = read_pgm(packed) if is_pgm(packed) else _decoded(packed)
+    except PgmError as error:
+        raise SiteError(f"map {path}: image: {image}: {error}") from None
     if picture is None:
         raise SiteError(f"map {path}: image: {image} is not a picture (PGM, PNG, BMP)")
-    if max(picture.shape) > MAX_MAP_SIDE:
-        raise SiteError(f"map {path}: image: {image} is {picture.shape[1]} x {picture.shape[0]}, at most {MAX_MAP_SIDE} a side")
-    return np.asarray(picture, dtype=np.uint8)
+    height, width = picture.cells.shape
+    if max(height, width) > MAX_MAP_SIDE:
+        raise SiteError(f"map {path}: image: {image} is {width} x {height}, at most {MAX_MAP_SIDE} a side")
+    return picture
 
 
-def _decoded(packed: Mask) -> Any:
+def _decoded(packed: bytes) -> Picture | None:
     try:
-        return cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE) if len(packed) else None
+        cells: Any = (
+            cv2.imdecode(np.frombuffer(packed, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH) if packed else None
+        )
     except cv2.error:
         return None
+    return None if cells is None or cells.dtype.kind != "u" else Picture(cells, np.iinfo(cells.dtype).max)

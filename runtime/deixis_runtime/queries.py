@@ -11,6 +11,7 @@ from typing import Literal
 import zenoh
 from deixis_schemas import codec
 from deixis_schemas.messages import Message
+from deixis_schemas.plain_text import shown
 from deixis_schemas.topics import Topic
 
 from .outputs import oversize
@@ -152,7 +153,7 @@ def check_names(parameters: Mapping[str, str], known: Sequence[str]) -> None:
     """
     for name in parameters:
         if name not in known and name != "format" and not name.startswith("_"):
-            raise Refused(f"{name[:40]}: unknown parameter; there are {', '.join((*known, 'format'))}")
+            raise Refused(f"{shown(name[:40])}: unknown parameter; there are {', '.join((*known, 'format'))}")
 
 
 def key_matches(expression: str, key: str) -> bool:

@@ -15,7 +15,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from .plain_text import plain
 
 MAX_SIDE_PX = 8192
 MAX_PERSONS = 32
@@ -35,6 +37,7 @@ SIGMA_SLACK = 1e-3
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]{0,63}$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Text = Annotated[str, Field(max_length=MAX_TEXT)]
+Line = AfterValidator(plain)  # of text that people write: no control characters
 Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Nanoseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Share = Annotated[float, Field(ge=-1e-9, le=1 + 1e-9)]
@@ -363,11 +366,13 @@ class Poi(Message):
     """A point of interest in the map frame."""
 
     poi_id: Name = Field(description="Equals the last part of its key.")
-    name: Text = Field(default="", description="For people; the id where it is empty.")
+    name: Annotated[Text, Line] = Field(default="", description="For people, one line; the id where it is empty.")
     position_m: Position = Field(description="Centre in the map frame, x, y, z, metres.")
     extent_m: float = Field(default=0.5, ge=0, le=1000, description="Size across, metres.")
-    tags: list[Annotated[str, Field(max_length=64)]] = Field(default_factory=list, max_length=32)
-    edited_by: Annotated[str, Field(max_length=128)] = Field(default="", description="Who put it there, where that was told.")
+    tags: list[Annotated[str, Field(max_length=64), Line]] = Field(default_factory=list, max_length=32)
+    edited_by: Annotated[str, Field(max_length=128), Line] = Field(
+        default="", description="Who put it there, where that was told."
+    )
     edited_ns: Nanoseconds = Field(default=0, description="When, by the registry's clock, which fills it in; 0 where unknown.")
 
 

@@ -300,6 +300,9 @@ def test_person_asks_for_one_person(full: Desk) -> None:
         ({"person": "-1"}, r"^person: '-1'"),
         ({"persons": "1"}, "^persons: unknown parameter; there are top, poi, person, format"),
         ({"person": "9" * 400}, "^person: "),
+        ({"poi": "a\x1b[2J"}, r"^poi: there is no POI 'a<U\+001B>\[2J'"),
+        ({"top": "\n9"}, r"^top: '<U\+000A>9'"),
+        ({"per\x1bson": "1"}, r"^per<U\+001B>son: unknown"),
     ],
 )
 def test_a_parameter_that_cannot_be_is_refused_with_its_name(full: Desk, parameters: dict[str, str], complaint: str) -> None:

@@ -76,7 +76,7 @@ def test_a_mirrored_bearing_is_the_sum_of_both_and_none_the_mean() -> None:
 
 def test_a_curve_is_read_between_its_degrees_and_across_its_ends() -> None:
     curve = np.cos(np.radians(BEARINGS))[None]
-    asked = np.array([[-180.0, 179.9, 0.25], [60.5, -540.0, 359.5]])
+    asked = np.array([[-180.0, 179.9, 0.25], [60.5, -270.0, 269.5]])
     assert at(curve[None], asked[None].astype(np.float32))[0, 0] == pytest.approx(np.cos(np.radians(asked)), abs=1e-4)
 
 

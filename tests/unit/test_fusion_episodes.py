@@ -12,11 +12,10 @@ from deixis_fusion.config import FusionConfig
 from deixis_fusion.episodes import EpisodeTracker, Stroke
 from deixis_fusion.evidence import Sample
 from deixis_fusion.fusion import Fusion
-from deixis_fusion.hand_evidence import hand_over
-from deixis_fusion.head_evidence import head_over
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import RobotPlace
 from deixis_fusion.robust import weigh
+from deixis_fusion.shown import shown_over
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     Belief,
@@ -140,8 +139,8 @@ def samples(hands: Sequence[Gesture | None], heads: Sequence[HeadPose | None]) -
 
 
 def test_more_frames_do_not_make_a_stroke_more_certain() -> None:
-    short = head_over(weigh(samples([gesture()] * 20, [pose(60)] * 20), 0.2))
-    long = head_over(weigh(samples([gesture()] * 200, [pose(60)] * 200), 0.2))
+    short = shown_over(weigh(samples([gesture()] * 20, [pose(60)] * 20), 0.2)).head
+    long = shown_over(weigh(samples([gesture()] * 200, [pose(60)] * 200), 0.2)).head
     assert short == long
     assert short is not None
     assert short.yaw_sigma_deg == pytest.approx(3.0)
@@ -149,36 +148,36 @@ def test_more_frames_do_not_make_a_stroke_more_certain() -> None:
 
 def test_the_head_on_its_way_and_outliers_hardly_count() -> None:
     yaws = [10, 20, 30, 40, 50] + [60.0] * 20 + [-150.0] * 3
-    head = head_over(weigh(samples([gesture()] * 28, [pose(yaw) for yaw in yaws]), 0.2))
+    head = shown_over(weigh(samples([gesture()] * 28, [pose(yaw) for yaw in yaws]), 0.2)).head
     assert head is not None
     assert head.yaw_deg == pytest.approx(60)
 
 
 def test_a_head_mostly_out_of_range_is_out_of_range_to_its_side() -> None:
     heads = [pose(90)] * 8 + [pose(None, "out_of_range", side="left")] * 20
-    head = head_over(weigh(samples([gesture()] * 28, heads), 0.2))
+    head = shown_over(weigh(samples([gesture()] * 28, heads), 0.2)).head
     assert head is not None
     assert (head.yaw_deg, head.side) == (None, "left")
 
 
 @pytest.mark.parametrize("shown", [None, pose(None, "lost"), pose(None, "initialising")])
 def test_a_head_that_was_not_tracked_says_nothing(shown: HeadPose | None) -> None:
-    assert head_over(weigh(samples([gesture()] * 30, [shown] * 30), 0.2)) is None
+    assert shown_over(weigh(samples([gesture()] * 30, [shown] * 30), 0.2)).head is None
 
 
 def test_the_hand_goes_by_the_vote_and_a_finger_seen_now_and_then_counts() -> None:
     kinds = ["point_left"] * 12 + ["invisible"] * 18
-    hand = hand_over(weigh(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0))
+    hand = shown_over(weigh(samples([gesture(kind, hand="left") for kind in kinds], [None] * 30), 0.0)).hand
     assert hand is not None
     assert (hand.gesture, hand.hand) == ("point_left", "left")
-    hand = hand_over(weigh(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0))
+    hand = shown_over(weigh(samples([gesture("invisible")] * 28 + [gesture()] * 2, [None] * 30), 0.0)).hand
     assert hand is not None
     assert hand.gesture == "invisible"
 
 
 def test_mirrored_bearings_are_taken_from_the_front_whichever_was_named() -> None:
     told = [gesture(bearing_deg=b, bearing_sigma_deg=10, bearing_mirrored=True) for b in [50.0, 130.0, 52.0, 128.0, 51.0]]
-    hand = hand_over(weigh(samples([*told], [None] * 5), 0.0))
+    hand = shown_over(weigh(samples([*told], [None] * 5), 0.0)).hand
     assert hand is not None
     assert hand.bearing_deg == pytest.approx(51, abs=1)
     assert hand.mirrored

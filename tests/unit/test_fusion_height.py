@@ -11,10 +11,9 @@ from deixis_fusion.decision import Judgement
 from deixis_fusion.deixis_rules import DeixisRules
 from deixis_fusion.evidence import Evidence, HandObservation, HeadObservation, Sample, Witness
 from deixis_fusion.frames import Frames
-from deixis_fusion.hand_evidence import hand_over
-from deixis_fusion.head_evidence import head_over
-from deixis_fusion.height import elevation_of_head, head_likelihoods
+from deixis_fusion.height import Heights, elevation_of_head, head_likelihoods
 from deixis_fusion.localisation import PersonPlace
+from deixis_fusion.shown import shown_over
 from deixis_fusion.sight import Lookout, Points
 from deixis_fusion.visibility import Walls
 from deixis_headpose.head import Pose, rotation_of
@@ -95,7 +94,7 @@ def test_pois_at_one_height_are_told_apart_as_before(pitch: float, sigma: float)
 def test_the_likelihood_is_1_where_it_fits_and_has_a_tail() -> None:
     points, extent = np.array([(2.0, -1.5, 1.6), (2.0, -1.5, -9.0)]), np.array([0.0, 0.0])
     level = HeadObservation(90.0, 3, pitch_deg=0.0, pitch_sigma_deg=3)
-    high = head_likelihoods(level, PLACE, points, extent, CONFIG.head)
+    high = head_likelihoods(level, PLACE, Heights.of(PLACE, points, extent), CONFIG.head)
     assert high is not None
     assert high[0] == pytest.approx(1, abs=0.02)
     assert 0.15 < high[1] < 0.3
@@ -118,7 +117,7 @@ def test_over_a_stroke_the_elevation_is_the_median_of_the_frames_that_tell_it() 
     said = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 9.0}
     frames = [said | {"elevation_deg": high, "elevation_sigma_deg": 8.0} for high in (-20.0, -20.0, -20.0, 50.0)]
     samples = [Sample(i, i, Gesture.model_validate(frame), None) for i, frame in enumerate([*frames, said])]
-    told, silent = hand_over(Frames.of(samples)), hand_over(Frames.of(samples[-1:]))
+    told, silent = shown_over(Frames.of(samples)).hand, shown_over(Frames.of(samples[-1:])).hand
     assert told is not None
     assert silent is not None
     assert (told.elevation_deg, told.elevation_sigma_deg) == (-20.0, 8.0)
@@ -133,7 +132,7 @@ def pose(pitch: float | None, variance: float | None) -> HeadPose:
 
 def test_over_a_stroke_the_pitch_is_the_median_and_needs_its_sigma_in_most_frames() -> None:
     def over(*poses: HeadPose) -> HeadObservation:
-        head = head_over(Frames.of([Sample(i, i, None, shown) for i, shown in enumerate(poses)]))
+        head = shown_over(Frames.of([Sample(i, i, None, shown) for i, shown in enumerate(poses)])).head
         assert head is not None
         return head
 

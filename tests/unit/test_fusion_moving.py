@@ -13,14 +13,14 @@ from deixis_fusion.config import FusionConfig
 from deixis_fusion.evidence import Evidence, Sample, Witness
 from deixis_fusion.frames import FrameLog, Frames
 from deixis_fusion.fusion import Fusion
-from deixis_fusion.hand_evidence import hand_over
-from deixis_fusion.head_evidence import head_over
 from deixis_fusion.joining import JoinedFrame
 from deixis_fusion.localisation import PersonPlace
-from deixis_fusion.robust import median_angle
+from deixis_fusion.robust import middles_of
+from deixis_fusion.shown import shown_over
 from deixis_fusion.sight import Lookout, Points
-from deixis_fusion.views import MOST_VIEWS, last_place, parts_of, views_of
+from deixis_fusion.views import last_place, parts_of, views_of
 from deixis_fusion.visibility import Walls
+from deixis_fusion.walk import MOST_VIEWS
 from deixis_schemas.anatomy import FACE_WIDTH_M
 from deixis_schemas.messages import (
     CameraInfo,
@@ -153,7 +153,7 @@ def test_a_log_that_grows_has_the_same_frames_and_leaves_alone_what_was_taken_fr
 
 def test_a_ray_stays_where_it_is_in_the_map_while_the_camera_goes_round() -> None:
     weighed = Frames.of([sample(i, axis_deg=i, bearing=wrapped(170 - i)) for i in range(40)])
-    hand, head = hand_over(weighed, 39), head_over(weighed, 39)
+    hand, head = shown_over(weighed, 39)
     assert hand is not None
     assert head is not None
     assert (hand.bearing_deg, head.yaw_deg) == pytest.approx((131, 131))
@@ -165,7 +165,7 @@ def test_what_is_behind_and_what_is_before_come_apart_when_the_camera_goes_round
     weighed = Frames.of(
         [sample(i, axis_deg=i, bearing=(120 - i) if i % 2 else 180 - (120 - i), bearing_mirrored=True) for i in range(40)]
     )
-    hand = hand_over(weighed, 39)
+    hand = shown_over(weighed, 39).hand
     assert hand is not None
     sigmas = {round(bearing): sigma for bearing, sigma in hand.bearings}
     assert sigmas[81] == pytest.approx(8, abs=8)
@@ -177,21 +177,19 @@ def test_a_curve_of_bearings_turns_with_the_camera() -> None:
         return [math.exp(-0.5 * (wrapped(-180 + 5 * i - peak) / 12) ** 2) for i in range(72)]
 
     weighed = Frames.of([sample(i, 2 * i, 60 - 2 * i, bearing_likelihood=curve(60 - 2 * i)) for i in range(20)])
-    hand = hand_over(weighed, 38)
+    hand = shown_over(weighed, 38).hand
     assert hand is not None
     assert hand.likelihood == pytest.approx(curve(22), abs=0.03)
 
 
 def test_angles_are_one_cluster_wherever_the_circle_is_cut() -> None:
-    assert median_angle(np.array([178.0, 179, -179, -178, 180]), np.ones(5)) == (
-        pytest.approx(-180),
-        pytest.approx(1.48, abs=0.1),
-    )
+    (middle,) = middles_of(np.array([[178.0, 179, -179, -178, 180], [0] * 5, [7] * 5, [1] * 5]), 0)
+    assert middle == (pytest.approx(-180), pytest.approx(1.48, abs=0.1), 7, 1)
 
 
 def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
     weighed = Frames.of([sample(i, 180, 60, person=(0.0, 0.05 * i)) for i in range(150)])
-    views = views_of(parts_of(weighed), hand_over(weighed), head_over(weighed))
+    views = views_of(parts_of(weighed), *shown_over(weighed))
     assert 2 < len(views) <= MOST_VIEWS
     assert sum(view.hand_share for view in views) == pytest.approx(1)
     assert sum(view.head_share for view in views) == pytest.approx(1)
@@ -199,14 +197,14 @@ def test_a_walk_has_few_views_whose_shares_are_all_there_is() -> None:
 
 def test_who_stands_is_seen_from_one_place() -> None:
     weighed = Frames.of([sample(i, i, 60 - i, person=(0.0, 0.01 * (i % 3))) for i in range(150)])
-    assert views_of(parts_of(weighed), hand_over(weighed), head_over(weighed)) == ()
+    assert views_of(parts_of(weighed), *shown_over(weighed)) == ()
 
 
 def test_of_a_walk_past_very_many_pois_few_cases_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(3)
     pois = [Poi(poi_id=f"p{i}", position_m=(*rng.uniform(-8, 8, 2), 1.2), extent_m=rng.uniform(0, 1)) for i in range(600)]
     weighed = Frames.of([sample(i, 180, 60 + 0.1 * i, person=(0.0, 0.03 * i)) for i in range(60)])
-    hand, head = hand_over(weighed), head_over(weighed)
+    hand, head = shown_over(weighed)
     views = views_of(parts_of(weighed), hand, head)
     seen = Lookout(0.15).look(last_place(weighed.samples), Points.of(pois), Walls(()))  # type: ignore[arg-type]
     said = Witness("ok", "")

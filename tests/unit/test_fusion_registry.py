@@ -185,6 +185,55 @@ def test_a_malformed_poi_is_refused_with_the_fields_name(payload: bytes, label: 
         read_poi("vase", payload, label)
 
 
+# A line break, an escape, an end of text, a C1 control, a line separator, an override, an isolate, half of a character.
+STEERING = ["\n", "\x1b", "\x00", "\x9b", "\u2028", "\u202e", "\u2066", "\ud800"]
+
+
+@pytest.mark.parametrize("bad", STEERING)
+@pytest.mark.parametrize("field", ["name", "tags", "edited_by", "poi_id"])
+def test_a_control_character_is_refused_with_the_fields_name_and_never_repeated(field: str, bad: str) -> None:
+    content = {"position_m": [1, 2, 3], field: ["ok", f"ab{bad}c"] if field == "tags" else f"ab{bad}c"}
+    with pytest.raises(EditError, match=f"^{field}") as refused:
+        read_poi("vase", json.dumps(content).encode(), "application/json")
+    assert bad not in str(refused.value)
+    if field != "poi_id" and bad != "\ud800":
+        assert f"character 3 is the control character U+{ord(bad):04X}" in str(refused.value)
+
+
+def test_names_of_any_script_with_marks_of_direction_and_joiners_are_plain() -> None:
+    for name in (
+        "Vase \u200f\u05d0\u05d2\u05e8\u05d8\u05dc",
+        "\u82b1\u74f6",
+        "Caf\u00e9 No\u00a05",
+        "\U0001f469\u200d\U0001f33e",
+    ):
+        assert read_poi("vase", json.dumps({"position_m": [1, 2, 3], "name": name}).encode(), "").name == name
+
+
+@pytest.mark.parametrize("bad", STEERING[:-1])
+def test_who_edits_and_ids_in_a_query_hold_no_control_characters(edits: PoiEdits, bad: str) -> None:
+    put = {"position_m": [1, 2, 3]}
+    many = query(f"{PREFIX}*", {f"a{bad}": put}, op="put_all")
+    for asked in (
+        query(payload=put, by=f"me{bad}"),
+        query(f"{PREFIX}a{bad}", put),
+        query(f"{PREFIX}a{bad}", op="delete"),
+        many,
+    ):
+        with pytest.raises(Refused) as refused:
+            edits.answer(asked, 0)
+        assert bad not in str(refused.value)
+    assert edits.accepted == 0
+
+
+def test_a_registry_of_an_earlier_version_with_control_characters_is_read_with_spaces_for_them(path: Path) -> None:
+    registry = Registry(path)
+    registry.put(Poi.model_construct(**poi("vase").model_dump() | {"name": "a\nb\x1b", "tags": ["\x00"]}))
+    registry.close()
+    (kept,) = Registry(path).pois()
+    assert (kept.name, kept.tags) == ("a b ", [" "])
+
+
 @pytest.mark.parametrize(
     "key",
     [

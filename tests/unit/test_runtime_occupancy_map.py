@@ -66,11 +66,60 @@ def test_the_origins_yaw_turns_the_map(tmp_path):
 def test_negate_raw_and_png_are_read_as_map_server_does(tmp_path):
     expected = map_lines(written(tmp_path, hall()))
     assert map_lines(written(tmp_path, 255 - hall(), YAML.replace("negate: 0", "negate: 1"))) == expected
+    # Scaled maps tell how likely what is between free and occupied is; what is occupied is the same.
+    assert map_lines(written(tmp_path, hall(), YAML.replace("trinary", "scale"))) == expected
     raw = np.where(hall() == OCCUPIED, 100, np.where(hall() == FREE, 0, 255)).astype(np.uint8)
     assert map_lines(written(tmp_path, raw, YAML.replace("trinary", "raw"))) == expected
     cv2.imwrite(str(tmp_path / "hall.png"), hall())
     (tmp_path / "hall.yaml").write_text(YAML.replace("hall.pgm", "hall.png").replace("mode: trinary\n", "lethal: 1\n"))
     assert map_lines(tmp_path / "hall.yaml") == expected
+
+
+def pgm(cells: np.ndarray, most: int, text: bool = False) -> bytes:
+    """The same shades, of which that value is white; as bytes or as text with comments in it."""
+    shades = np.rint(cells * (most / 255)).astype(">u2" if most > 255 else np.uint8)
+    kind = b"P2" if text else b"P5"
+    header = kind + b"\n# made by hand\n%d # wide\n%d\n%d\n" % (*cells.shape[::-1], most)
+    lines = [f"# row {i}\n{' '.join(map(str, row))}\n" for i, row in enumerate(shades)]
+    return header + ("".join(lines).encode() if text else shades.tobytes())
+
+
+@pytest.mark.parametrize("text", [False, True])
+@pytest.mark.parametrize("most", [1, 15, 100, 255, 1000, 65535])
+def test_a_map_is_read_by_its_largest_value_in_bytes_or_in_text(tmp_path, most, text):
+    expected = map_lines(written(tmp_path, hall()))
+    (tmp_path / "hall.pgm").write_bytes(pgm(hall(), most, text))
+    assert map_lines(tmp_path / "hall.yaml") == expected
+
+
+def test_sixteen_bits_of_png_are_read_as_eight(tmp_path):
+    expected = map_lines(written(tmp_path, hall()))
+    cv2.imwrite(str(tmp_path / "hall.png"), hall().astype(np.uint16) * 257)
+    (tmp_path / "hall.yaml").write_text(YAML.replace("hall.pgm", "hall.png"))
+    assert map_lines(tmp_path / "hall.yaml") == expected
+
+
+@pytest.mark.parametrize(
+    ("packed", "complaint"),
+    [
+        (pgm(hall(), 255)[:-1], "cut off: 13999 of 14000 cells"),
+        (pgm(hall(), 255, text=True)[:-4], "cut off"),
+        (b"P5\n4 4\n0\n" + bytes(16), "largest value is 0"),
+        (b"P5\n4 4\n70000\n" + bytes(32), "largest value is 70000"),
+        (b"P5\n4 4\n100\n" + bytes([200] * 16), "a cell is 200, beyond its largest value 100"),
+        (b"P5\n0 4\n255\n", "0 x 4"),
+        (b"P5\nwide\n", "header"),
+        (b"P2\n2 2\n255\n1 2 x 4\n", "not numbers"),
+        (b"P2\n2 2\n255\n1 2 3 -4\n", "beyond"),
+    ],
+)
+def test_a_pgm_that_is_damaged_is_refused_in_words(tmp_path, packed, complaint):
+    path = written(tmp_path, hall())
+    (tmp_path / "hall.pgm").write_bytes(packed)
+    with pytest.raises(SiteError, match=complaint) as error:
+        map_lines(path)
+    assert "hall.yaml" in str(error.value)
+    assert "image" in str(error.value)
 
 
 @pytest.mark.parametrize(

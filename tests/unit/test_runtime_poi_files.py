@@ -114,3 +114,26 @@ def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path):
 def test_the_example_that_the_readme_imports_can_be_read():
     pois = load_pois(Path(__file__).parents[2] / "examples" / "exhibits.csv")
     assert [(poi.poi_id, poi.tags) for poi in pois] == [("lamp", []), ("chart", ["paper", "maps"]), ("anchor", ["iron"])]
+
+
+@pytest.mark.parametrize("bad", ["\x1b", "\x00", "\u202e", "\n"])
+@pytest.mark.parametrize("kind", ["a.yaml", "b.json", "c.geojson", "d.csv", "e.yaml"])
+@pytest.mark.parametrize("field", ["name", "tags", "poi_id"])
+def test_control_characters_are_refused_with_file_and_field(tmp_path, bad, kind, field):
+    text = f"ab{bad}c"
+    told = {"poi_id": "vase", "name": "Vase", "tags": ["blue"]} | {field: ["blue", text] if field == "tags" else text}
+    content = {
+        "a.yaml": [told | {"position_m": [1, 2, 3]}],
+        "b.json": [told | {"position_m": [1, 2, 3]}],
+        "c.geojson": collection(feature(place=(1, 2, 3)) | {"properties": told}),
+        "d.csv": f'poi_id,name,tags,x_m,y_m,z_m\n"{told["poi_id"]}","{told["name"]}","{";".join(told["tags"])}",1,2,3\n',
+        "e.yaml": {"pois": [told | {"position_m": [1, 2, 3]}]},
+    }[kind]
+    path = file(tmp_path, kind, content)
+    if kind == "d.csv" and bad == "\n" and field != "poi_id":
+        # A cell of several lines is read as one.
+        assert "ab c" in str(said(path))
+        return
+    with pytest.raises(SiteError, match=rf"{kind}.*{field}") as refused:
+        load_pois(path)
+    assert bad not in str(refused.value)

@@ -25,9 +25,12 @@ Curve = Values
 
 # Between whole degrees: so left and right are mirror images, also where they meet behind.
 BEARINGS: Values = np.arange(-179.5, 180.0)
-# Of a curve three times round and a step to either side: the places in it.
-AROUND = np.arange(-1, 3 * len(BEARINGS) + 1) % len(BEARINGS)
 FULL_CIRCLE_DEG = 360.0
+# Bearings that are looked up lie within this to either side: half round, and half as far again for a part of a POI.
+FARTHEST_DEG = 270.0
+# The places in a curve of all degrees as far as that, and of one more to either side.
+AROUND = np.arange(-91, 451) % len(BEARINGS)
+_BEFORE = int(1.5 * FULL_CIRCLE_DEG - FARTHEST_DEG)
 GAIN_STEPS = 8
 LOOK_AT_ROBOT_SIGMA_DEG = 8.0
 # A side is told wrongly now and then; a zero would make that a total conflict.
@@ -42,17 +45,17 @@ LEAST_OUT_OF_RANGE = 0.05
 def at(curves: Values, bearings_deg: Singles) -> Singles:
     """Curves (c, v, 360), each v at bearings of its own (v, ...), on a line between its values: (c, v, ...).
 
-    Bearings lie within -540 and 540 degrees.
+    Bearings lie within `FARTHEST_DEG` to either side.
     """
     # Looked up in `AROUND`: a modulo of each bearing takes longer than all else here.
     around = curves.astype(np.float32).take(AROUND, axis=-1)
     steps = np.empty_like(around)
     np.subtract(around[..., 1:], around[..., :-1], out=steps[..., :-1])
     steps[..., -1] = 0
-    share = bearings_deg + np.float32(FULL_CIRCLE_DEG - BEARINGS[0] + 1)
+    share = bearings_deg + np.float32(1.5 * FULL_CIRCLE_DEG + 0.5)
     below = share.astype(np.intp)
     share -= below
-    below += np.arange(0, steps[0].size, steps.shape[-1]).reshape(-1, *(1,) * (below.ndim - 1))
+    below += np.arange(0, steps[0].size, steps.shape[-1]).reshape(-1, *(1,) * (below.ndim - 1)) - _BEFORE
     told = np.empty((len(curves), *bearings_deg.shape), dtype=np.float32)
     for i in range(len(curves)):
         told[i] = steps[i].ravel().take(below)
@@ -71,10 +74,9 @@ def rise(x: Values, width: float) -> Values:
 
 def hand_curve(hand: HandObservation, config: HandConfig, confusion: HandConfusion | None = None) -> Curve:
     """P(gesture | bearing) P(hand's bearing | bearing); by the paper's table 1 where no other is given."""
-    return gesture_curve(hand.gesture, config, confusion or table_1()) * _bearing_curve(hand, config)
+    return gesture_curve(hand.gesture, config, confusion or table_1()) * bearing_curve(hand, config)
 
 
-@lru_cache(maxsize=16)
 def gesture_curve(gesture: PointingGesture, config: HandConfig, confusion: HandConfusion) -> Curve:
     """P(gesture | bearing): table 1's columns, blended over the borders of the hand's range instead of cut there."""
     size, soft = np.abs(BEARINGS), config.soft_deg
@@ -88,7 +90,7 @@ def gesture_curve(gesture: PointingGesture, config: HandConfig, confusion: HandC
     return np.maximum(WRONG_SIDE, inside * beside + (1 - inside) * center * 2 * agrees)
 
 
-def _bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:
+def bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:
     """P(bearing measured at the hand | bearing), per degree, with a uniform tail; 1 where none was measured."""
     if hand.likelihood:
         hit = _blurred(np.array(hand.likelihood), config.sigma_floor_deg)
@@ -103,7 +105,7 @@ def _bearing_curve(hand: HandObservation, config: HandConfig) -> Curve:
 
 def _blurred(told: Values, sigma_deg: float) -> Curve:
     """The stage's own likelihood of bearings -180, -175 ... 175 as a density, blurred by a normal distribution."""
-    return np.asarray(_blur(sigma_deg) @ (told / (told.sum() * BEARING_STEP_DEG)))
+    return np.asarray(_blur(sigma_deg) @ (told / (np.add.reduce(told) * BEARING_STEP_DEG)))
 
 
 @lru_cache(maxsize=4)
@@ -137,16 +139,26 @@ def yaw_curve(yaw_deg: float, yaw_sigma_deg: float, config: HeadConfig) -> Curve
 
     The part `full_turn` of them turns all the way, the others any of the gains.
     """
-    turned, shares = _turns(config)
-    return np.asarray(shares @ _density(_wrapped(yaw_deg - turned), math.hypot(yaw_sigma_deg, config.sigma_deg)))
+    turned, shares = _turns(config.full_turn, config.overshoot_deg, config.gain_min, config.gain_max)
+    variance = yaw_sigma_deg**2 + config.sigma_deg**2
+    away = np.abs(yaw_deg - turned)
+    np.minimum(away, FULL_CIRCLE_DEG - away, out=away)
+    # In place: of all that is reckoned for each frame of a stroke this is the most.
+    np.multiply(away, away, out=away)
+    away *= -0.5 / variance
+    return np.asarray((shares / math.sqrt(2 * math.pi * variance)) @ np.exp(away, out=away))
 
 
 @lru_cache(maxsize=4)
-def _turns(config: HeadConfig) -> tuple[Values, Values]:
-    """How far heads turn to look at each bearing (GAIN_STEPS + 1, 360), degrees: all the way, or a part; the share of each."""
-    overshoot = np.copysign(np.minimum(config.overshoot_deg, np.abs(BEARINGS) / 10), BEARINGS)
-    partial = np.full(GAIN_STEPS, (1 - config.full_turn) / GAIN_STEPS)
-    return np.vstack([BEARINGS + overshoot, _gains(config)[:, None] * BEARINGS]), np.append(config.full_turn, partial)
+def _turns(full_turn: float, overshoot_deg: float, gain_min: float, gain_max: float) -> tuple[Values, Values]:
+    """How far heads turn to look at each bearing (GAIN_STEPS + 1, 360), degrees: all the way, or a part; the share of each.
+
+    Kept by numbers, for settings are slow to compare.
+    """
+    overshoot = np.copysign(np.minimum(overshoot_deg, np.abs(BEARINGS) / 10), BEARINGS)
+    partial = np.full(GAIN_STEPS, (1 - full_turn) / GAIN_STEPS)
+    gains = np.linspace(gain_min, gain_max, GAIN_STEPS)[:, None]
+    return np.vstack([BEARINGS + overshoot, gains * BEARINGS]), np.append(full_turn, partial)
 
 
 def out_of_range_curve(head: HeadObservation, config: HeadConfig) -> Curve:
@@ -154,7 +166,8 @@ def out_of_range_curve(head: HeadObservation, config: HeadConfig) -> Curve:
     limit = config.range_deg if head.beyond_deg is None else head.beyond_deg
     size = np.abs(BEARINGS)
     full = rise(size - limit, config.range_soft_deg)
-    partial = rise(_gains(config)[:, None] * size - limit, config.range_soft_deg).mean(axis=0)
+    gains = np.linspace(config.gain_min, config.gain_max, GAIN_STEPS)[:, None]
+    partial = rise(gains * size - limit, config.range_soft_deg).mean(axis=0)
     return np.asarray((config.full_turn * full + (1 - config.full_turn) * partial) * _side_curve(head.side))
 
 
@@ -165,10 +178,6 @@ def _side_curve(side: Side | None) -> Curve:
     toward = BEARINGS if side == "left" else -BEARINGS
     inside = np.where(toward > 0, np.minimum(toward, 180 - toward), np.maximum(toward, -180 - toward))
     return np.maximum(WRONG_SIDE, rise(inside, SIDE_BORDER_DEG))
-
-
-def _gains(config: HeadConfig) -> Values:
-    return np.linspace(config.gain_min, config.gain_max, GAIN_STEPS)
 
 
 # --- angles -----------------------------------------------------------------------------------------------------------

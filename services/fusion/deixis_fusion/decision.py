@@ -46,12 +46,12 @@ class Judgement:
     @cached_property
     def order(self) -> npt.NDArray[np.intp]:
         """The hypotheses, the likeliest first."""
-        return np.argsort(-self.chances, kind="stable")
+        return (-self.chances).argsort(kind="stable")
 
     @cached_property
     def credible(self) -> tuple[int, ...]:
         """The fewest hypotheses, best first, among which the POI meant is with a probability of `credible_share`."""
-        needed = int(np.searchsorted(np.cumsum(self.chances[self.order]), self.credible_share * (1 - 1e-12))) + 1
+        needed = int(self.chances[self.order].cumsum().searchsorted(self.credible_share * (1 - 1e-12))) + 1
         return tuple(self.order[:needed].tolist())
 
     @cached_property

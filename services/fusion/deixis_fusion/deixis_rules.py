@@ -31,6 +31,7 @@ POSSIBILITY_LEVELS = 5
 TOLD = 0.1
 # Likelihoods that sum to less are none.
 LEAST = 1e-300
+REGION_ORDER: tuple[Region, ...] = ("left", "center", "right")
 NOTHING_TOLD = "nothing was observed that tells the POIs apart"
 
 
@@ -86,15 +87,17 @@ class DeixisRules:
 
 def likeliest(chances: Values, tie_ratio: float) -> tuple[int, ...]:
     """The hypotheses that are at least `tie_ratio` times as likely as the likeliest, best first."""
-    tied = np.flatnonzero(chances >= tie_ratio * chances.max())
-    return tuple(int(i) for i in tied[np.argsort(-chances[tied], kind="stable")])
+    (tied,) = (chances >= tie_ratio * np.maximum.reduce(chances)).nonzero()
+    return tuple(tied[(-chances[tied]).argsort(kind="stable")].tolist())
 
 
 def _tells(likelihoods: Values, observed: HandObservation | HeadObservation | None) -> bool:
     """Whether a source tells POIs apart; whether a lone one is what was meant, tells how well it fits."""
     if observed is None:
         return False
-    return len(likelihoods) == 1 or float(likelihoods.min()) < (1 - TOLD) * float(likelihoods.max())
+    if len(likelihoods) == 1:
+        return True
+    return bool(np.minimum.reduce(likelihoods) < (1 - TOLD) * np.maximum.reduce(likelihoods))
 
 
 # --- masses, to explain by ---------------------------------------------------------------------------------------------
@@ -108,31 +111,30 @@ def hand_masses(
     Without a bearing and with hard borders the single masses of a region sum to its mass by eq. 16, so the refinement adds
     what the bearing tells and nothing else.
     """
-    regions = _regions(hand, seen.bearings.likeliest, config, confusion)
+    sets, weights = _regions(hand, seen.bearings.likeliest, config, confusion)
     kept = 1 - config.discount
     of_single, of_regions = kept * config.refinement, kept * (1 - config.refinement)
-    total = sum(weight for _, weight in regions)
-    sets = [(flags, of_regions * weight / total) for flags, weight in regions]
-    everything = np.ones(len(likelihoods), dtype=np.bool_)
-    single = of_single / max(LEAST, float(likelihoods.sum())) * likelihoods
-    return MassVector.normalised(single, [*sets, (everything, config.discount)])
+    total = sum(weights)
+    masses = np.array([*(of_regions * weight / total for weight in weights), config.discount])
+    single = of_single / max(LEAST, float(np.add.reduce(likelihoods))) * likelihoods
+    return MassVector.weighed(single, sets, masses)
 
 
 def _regions(
     hand: HandObservation, bearings: Values, config: HandConfig, confusion: HandConfusion
-) -> Sequence[tuple[Flags, float]]:
-    """Eq. 16: the sets of POIs on the left, on the right and in the centre with weights; P(G) is the share of the POIs in G.
+) -> tuple[Flags, list[float]]:
+    """Eq. 16: the POIs on the left, in the centre and on the right, and all (4, n); and the weights of these regions.
 
-    All POIs, where none of the regions with POIs can have shown this gesture.
+    P(G) is the share of the POIs in G. Where none of the regions with POIs can have shown this gesture, it is all POIs' alone.
     """
     size = np.abs(bearings)
-    beside = (size >= config.min_deg) & (size <= config.max_deg)
-    regions: dict[Region, Flags] = {"left": beside & (bearings > 0), "center": ~beside, "right": beside & (bearings <= 0)}
-    count = len(bearings)
-    weights = [
-        (flags, confusion.share(hand.gesture, name) * np.count_nonzero(flags) / count) for name, flags in regions.items()
-    ]
-    return weights if any(weight for _, weight in weights) else [(np.ones(count, dtype=np.bool_), 1.0)]
+    sets = np.ones((len(REGION_ORDER) + 1, len(bearings)), dtype=np.bool_)
+    beside, left = (size >= config.min_deg) & (size <= config.max_deg), bearings > 0
+    sets[0], sets[1], sets[2] = beside & left, ~beside, beside & ~left
+    counts = np.add.reduce(sets[:-1], axis=1).tolist()
+    shares = [confusion.share(hand.gesture, region) for region in REGION_ORDER]
+    weights = [share * count / len(bearings) for share, count in zip(shares, counts, strict=True)]
+    return (sets, weights) if any(weights) else (np.ones((2, len(bearings)), dtype=np.bool_), [1.0])
 
 
 def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config: HeadConfig) -> MassVector:
@@ -145,9 +147,9 @@ def head_masses(head: HeadObservation, likelihoods: Values, floor: float, config
     if head.yaw_deg is None:
         return _out_of_range(told, floor).discounted(config.discount)
     single = told / len(told)
-    kept = (1 - config.discount) / max(LEAST, float(single.sum()) + floor)
-    everything = np.ones(len(told), dtype=np.bool_)
-    return MassVector.normalised(kept * single, [(everything, kept * floor + config.discount)])
+    kept = (1 - config.discount) / max(LEAST, float(np.add.reduce(single)) + floor)
+    everything = np.ones((1, len(told)), dtype=np.bool_)
+    return MassVector.weighed(kept * single, everything, np.array([kept * floor + config.discount]))
 
 
 def _out_of_range(possible: Values, floor: float) -> MassVector:

@@ -104,7 +104,7 @@ class EpisodeTracker:
         oldest_ns = sample.at_ns - self._config.max_evidence_s * 1e9
         # Now and then: where the person was at first is where the views of a walk begin (`views.py`).
         if self.stroke.samples[0].at_ns < oldest_ns - FORGOTTEN_EVERY_S * 1e9:
-            self.stroke.samples = FrameLog(kept for kept in self.stroke.samples if kept.at_ns >= oldest_ns)
+            self.stroke.samples = self.stroke.samples.since(oldest_ns)
 
     def _open_if_long_enough(self) -> None:
         stroke = self.stroke

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,19 +15,20 @@ from .pointing import PointingGesture
 
 NAN = math.nan
 POINTING: tuple[PointingGesture, ...] = ("point_left", "point_right", "invisible")
-
-
-# What a frame shows in numbers, in this order in `Sample.row`; not a number where it does not tell. Kinds are places in
-# `POINTING`, sides in `SIDES`, statuses in `STATUSES`.
-_OF_HAND = (
-    "kind", "hand", "bearing_deg", "bearing_sigma_deg", "mirrored", "has_curve", "elevation_deg", "elevation_sigma_deg",
-)  # fmt: skip
-_OF_HEAD = ("status", "yaw_deg", "yaw_sigma_deg", "side", "beyond_deg", "pitch_deg", "pitch_sigma_deg")
-_OF_PLACE = ("axis_deg", "x_m", "y_m")
-ROW = {name: i for i, name in enumerate(("at_ns", *_OF_HAND, *_OF_HEAD, *_OF_PLACE))}
 SIDES: tuple[Side, ...] = ("left", "right")
+
+# What a frame shows in numbers, in this order in `Sample.row`. First what it shows or not, 1 or 0 (the first is always 1); then
+# what is measured, not a number where it does not tell. Hand and head stand in one order: a direction, a height, their sigmas.
+HANDS, TURNED = ("left_hand", "right_hand"), ("turned_left", "turned_right")
+_HAND_FLAGS = (*POINTING, *HANDS, "mirrored", "has_curve")
+_HEAD_FLAGS = ("tracking", "out_of_range", *TURNED, "has_pitch")
+FLAGS = ("frame", *_HAND_FLAGS, *_HEAD_FLAGS)
+_OF_HAND = ("bearing_deg", "bearing_sigma_deg", "elevation_deg", "elevation_sigma_deg")
+_OF_HEAD = ("yaw_deg", "yaw_sigma_deg", "pitch_deg", "pitch_sigma_deg", "beyond_deg")
+_OF_PLACE = ("axis_deg", "x_m", "y_m")
+ROW = {name: i for i, name in enumerate((*FLAGS, *_OF_HAND, *_OF_HEAD, *_OF_PLACE, "at_ns"))}
 VARIANCE_OF_PITCH = 3  # in `HeadPose.covariance_deg2`
-STATUSES = ("tracking", "out_of_range")
+_PACKED = struct.Struct(f"{len(ROW)}d")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,33 +50,43 @@ class Sample:
         """The pointing gesture of a stroke; none in other phases and for other gestures."""
         if self.gesture is None or self.gesture.phase != "stroke":
             return None
-        return next((kind for kind in POINTING if kind == self.gesture.gesture), None)
+        return self.gesture.gesture if self.gesture.gesture in POINTING else None
 
-    @cached_property
     def row(self) -> bytes:
         """What the frame shows in numbers: `ROW`, packed."""
-        return struct.pack(f"{len(ROW)}d", self.at_ns, *self._of_hand(), *self._of_head(), *self._of_place())
+        shown = *self._hand_shown(), *self._head_shown()
+        return _PACKED.pack(True, *shown, *self._hand_measured(), *self._head_measured(), *self._placed(), self.at_ns)
 
-    def _of_hand(self) -> tuple[float, ...]:
+    def _hand_shown(self) -> tuple[bool, ...]:
+        told, kind = self.gesture, self.pointing
+        if told is None:
+            return (False,) * len(_HAND_FLAGS)
+        kinds = (kind == "point_left", kind == "point_right", kind == "invisible")
+        return *kinds, told.hand == "left", told.hand == "right", told.bearing_mirrored, bool(told.bearing_likelihood)
+
+    def _head_shown(self) -> tuple[bool, ...]:
+        told = self.pose
+        if told is None:
+            return (False,) * len(_HEAD_FLAGS)
+        has_pitch = told.pitch_deg is not None and told.covariance_deg2 is not None
+        return told.status == "tracking", told.status == "out_of_range", told.side == "left", told.side == "right", has_pitch
+
+    def _hand_measured(self) -> tuple[float, ...]:
         told = self.gesture
         if told is None:
             return (NAN,) * len(_OF_HAND)
-        kind, side = _place_in(POINTING, self.pointing), _place_in(SIDES, told.hand)
-        bearing = _known(told.bearing_deg, told.bearing_sigma_deg)
-        elevation = _known(told.elevation_deg, told.elevation_sigma_deg)
-        return kind, side, *bearing, float(told.bearing_mirrored), 1.0 if told.bearing_likelihood else NAN, *elevation
+        return _known(told.bearing_deg, told.bearing_sigma_deg, told.elevation_deg, told.elevation_sigma_deg)
 
-    def _of_head(self) -> tuple[float, ...]:
+    def _head_measured(self) -> tuple[float, ...]:
         told = self.pose
         if told is None:
             return (NAN,) * len(_OF_HEAD)
-        status, side = _place_in(STATUSES, told.status), _place_in(SIDES, told.side)
-        pitch = (NAN, NAN)
+        pitch: tuple[float | None, float | None] = (None, None)
         if told.pitch_deg is not None and told.covariance_deg2 is not None:
             pitch = told.pitch_deg, math.sqrt(told.covariance_deg2[VARIANCE_OF_PITCH])
-        return status, *_known(told.yaw_deg, told.yaw_sigma_deg), side, *_known(told.beyond_deg), *pitch
+        return _known(told.yaw_deg, told.yaw_sigma_deg, *pitch, told.beyond_deg)
 
-    def _of_place(self) -> tuple[float, ...]:
+    def _placed(self) -> tuple[float, ...]:
         if self.place is None:
             return (NAN,) * len(_OF_PLACE)
         return self.place.axis_deg, *self.place.position_m[:2]
@@ -91,15 +101,10 @@ class Sample:
         """A stroke of an open hand, a wave and the like."""
         return self.gesture is not None and self.gesture.phase == "stroke" and self.gesture.gesture == "other"
 
-    @cached_property
     def curve(self) -> bytes:
         """The gesture stage's likelihood of bearings, packed as `row`; empty where it does not tell it."""
         told = self.gesture.bearing_likelihood if self.gesture is not None else ()
         return struct.pack(f"{len(told)}d", *told)
-
-
-def _place_in(all_there_are: Sequence[str], one: str | None) -> float:
-    return float(all_there_are.index(one)) if one in all_there_are else NAN
 
 
 def _known(*values: float | None) -> tuple[float, ...]:

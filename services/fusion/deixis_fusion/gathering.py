@@ -8,10 +8,10 @@ from deixis_schemas.messages import HeadPose, SourceStatus
 
 from .config import EpisodesConfig
 from .evidence import Evidence, HandObservation, HeadObservation, Sample, Witness
-from .hand_evidence import hand_over
-from .head_evidence import head_now, head_over
+from .head_evidence import head_now
 from .joining import GESTURE, HEADPOSE, JoinedFrame
 from .robust import weigh
+from .shown import shown_over
 from .views import last_place, parts_of, views_of
 
 StageStatus = tuple[SourceStatus, str]
@@ -54,13 +54,15 @@ def _of_stroke(stroke: Sequence[Sample], latest: Sample, stages: Mapping[str, Wi
     frames, place = weigh(stroke, config.settle_s), last_place(stroke)
     axis_deg = place.axis_deg if place is not None else None
     parts = parts_of(frames)
-    hand, head = None, None
+    hand, head = shown_over(frames, axis_deg, with_curve=not parts)
     if _counts(gesture, stroke[-1], latest, config):
-        hand = hand_over(frames, axis_deg, with_curve=not parts)
         gesture = _hand_witness(hand, gesture, stroke[-1].stamp_ns)
+    else:
+        hand = None
     if _counts(headpose, posed, latest, config):
-        head = head_over(frames, axis_deg)
         headpose = _head_witness(head, stroke[-1].pose, headpose, posed.stamp_ns if posed else None)
+    else:
+        head = None
     return Evidence(hand, gesture, head, headpose, views_of(parts, hand, head))
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from deixis_schemas.messages import BEARING_STEP_DEG, BEARINGS
 
-from .evidence import POINTING, SIDES, HandObservation
-from .frames import Flags, Frames, Values
+from .evidence import HANDS, HandObservation
+from .frames import ROUNDING, Flags, Frames, Values
 from .pointing import PointingGesture
-from .robust import majority, median, median_and_spread, median_angle
+from .robust import Middle, middles_of
 
 # A finger seen in this part of the frames is seen: at VGA it comes and goes with the outline.
 DIRECTED_SHARE = 0.3
@@ -18,85 +20,94 @@ DIRECTED_SHARE = 0.3
 SAME_AXIS_DEG = 1.0
 
 
-def hand_over(frames: Frames, axis_deg: float | None = None, with_curve: bool = True) -> HandObservation | None:
-    """The pointing hand over a stroke; none without a pointing frame. On request without the likelihood of bearings.
+class Vote(NamedTuple):
+    """The gesture that most frames saw, the share of those that agree, and which show it; none where all do."""
 
-    Bearings are from the direction `axis_deg` in the map, whichever way the camera was when each was seen; without it, from the
-    direction to the camera in each frame.
-    """
-    kinds = frames.column("kind")
-    pointing = frames.tells("kind")
-    if not pointing.any():
+    gesture: PointingGesture
+    agreement: float
+    own: Flags | None
+
+
+def vote(frames: Frames, totals: Mapping[str, float]) -> Vote | None:
+    """What the frames vote for; none without a pointing frame. A finger seen now and then outweighs "invisible"."""
+    beside = totals["point_left"] + totals["point_right"]
+    pointing = beside + totals["invisible"]
+    if not pointing:
         return None
-    gesture, agreement = _vote(kinds[pointing], frames.weights[pointing])
-    own = pointing if gesture == "invisible" else kinds == POINTING.index(gesture)
-    sided = own & frames.tells("hand")
-    side = majority(frames.column("hand")[sided], frames.weights[sided])
-    hand = None if side is None else SIDES[side]
-    told = own & frames.tells("bearing_deg")
-    elevation, high_sigma = _elevation(frames, own)
-    if not told.any():
-        return HandObservation(gesture, agreement=agreement, hand=hand, elevation_deg=elevation, elevation_sigma_deg=high_sigma)
-    turns_of_all = frames.turns_to(axis_deg)
-    weights, turns, seen = frames.weights[told], turns_of_all[told], frames.column("bearing_deg")[told]
-    mirrored, mirror = bool(majority(frames.column("mirrored")[told], weights)), None
-    stated = median(frames.column("bearing_sigma_deg")[told], weights)
-    if mirrored:
-        seen = _in_front(seen)
-        # Front and back turn against each other as the camera moves: what was meant stays where it is in the map.
-        other, spread_of_other = median_angle(180 - seen + turns, weights)
-        mirror = (other, math.hypot(stated, spread_of_other))
-    bearing, spread = median_angle(seen + turns, weights)
-    curve = _mean_curve(frames, told & frames.tells("has_curve"), turns_of_all) if with_curve else ()
-    sigma = math.hypot(stated, spread)
-    return HandObservation(gesture, bearing, sigma, mirrored, agreement, hand, curve, mirror, elevation, high_sigma)
+    directed: PointingGesture = "point_left" if totals["point_left"] >= totals["point_right"] - ROUNDING else "point_right"
+    if totals[directed] >= DIRECTED_SHARE * pointing - ROUNDING:
+        own = None if totals[directed] == totals["frame"] else frames.show(directed)
+        return Vote(directed, totals[directed] / beside, own)
+    shown = frames.show("point_left") | frames.show("point_right") | frames.show("invisible")
+    return Vote("invisible", totals["invisible"] / pointing, None if shown.all() else shown)
 
 
-def _elevation(frames: Frames, own: Flags) -> tuple[float | None, float | None]:
-    """How high these frames point together, and its sigma, degrees; none where none of them tells."""
-    told = own & frames.tells("elevation_deg")
-    if not told.any():
-        return None, None
-    weights = frames.weights[told]
-    elevation, spread = median_and_spread(frames.column("elevation_deg")[told], weights)
-    stated = median(frames.column("elevation_sigma_deg")[told], weights)
-    return elevation, math.hypot(stated, spread)
+class HandFrames:
+    """The frames of a stroke that show what was voted for, and what these measured of the hand (4, n): see `evidence.ROW`.
 
-
-def _mean_curve(frames: Frames, told: Flags, turns_deg: Values) -> tuple[float, ...]:
-    """Of these frames together: their mean, for they show nearly the same, and where they differ either may be right.
-
-    `turns_deg` is added to the bearings of each frame. Those that turn alike are summed before they are turned.
+    `measured` becomes not a number in the other frames. `turns_deg` (n) is added to the bearings of each.
     """
-    if not told.any():
+
+    def __init__(self, frames: Frames, totals: Mapping[str, float], measured: Values, turns_deg: Values) -> None:
+        self._frames, self._totals, self._turns = frames, totals, turns_deg
+        self._weights, self._mirror = frames.weights, None
+        self.voted = vote(frames, totals)
+        if self.voted is None:
+            return
+        if self.voted.own is not None:
+            self._weights, measured[:, ~self.voted.own] = self._weights * self.voted.own, np.nan
+            self._totals = frames.totals(self._weights)
+        self._told = self._weights * ~np.isnan(measured[0])
+        if self._totals["mirrored"] and _is_mirrored(frames.column("mirrored"), self._told):
+            measured[0] = _in_front(measured[0])
+            # Front and back turn against each other as the camera moves: what was meant stays where it is in the map.
+            behind = np.concatenate([[180 - measured[0] + turns_deg], measured[1:]])
+            self._mirror = middles_of(behind, frames.early)[0]
+        measured[0] += turns_deg
+
+    def observed(self, middle: Middle, with_curve: bool) -> HandObservation | None:
+        """What they show together, with what they measured in the middle; on request without the likelihood of bearings."""
+        if self.voted is None:
+            return None
+        frames, mirror = self._frames, self._mirror
+        return HandObservation(
+            gesture=self.voted.gesture,
+            bearing_deg=middle.direction_deg,
+            bearing_sigma_deg=middle.sigma_deg,
+            mirrored=mirror is not None,
+            agreement=self.voted.agreement,
+            hand=frames.side_of(HANDS, self._totals, self._weights),
+            likelihood=self._curve() if with_curve and self._totals["has_curve"] else (),
+            mirror=None if mirror is None else (mirror.direction_deg or 0.0, mirror.sigma_deg or 0.0),
+            elevation_deg=middle.height_deg,
+            elevation_sigma_deg=middle.height_sigma_deg,
+        )
+
+    def _curve(self) -> tuple[float, ...]:
+        return mean_curve(self._told * self._frames.column("has_curve"), self._frames.curves, self._turns)
+
+
+def _is_mirrored(mirrored: Values, weights: Values) -> bool:
+    """Whether most frames with a bearing say that it may as well lie behind; of as many, whether the first of them does."""
+    more = float((2 * mirrored - 1) @ weights)
+    return more > ROUNDING or (more > -ROUNDING and bool(mirrored[weights > 0][:1].any()))
+
+
+def mean_curve(weights: Values, curves: Values, turns_deg: Values) -> tuple[float, ...]:
+    """The weighted mean of curves (n, bearings): they show nearly the same, and where they differ either may be right.
+
+    `turns_deg` (n) is added to the bearings of each; between its values a curve goes on a line. Those that turn by as many
+    steps are summed before they are turned.
+    """
+    total = float(np.add.reduce(weights))
+    if not total:
         return ()
-    weights, curves = frames.weights[told], frames.curves[told]
-    steps = np.rint(turns_deg[told] / SAME_AXIS_DEG)
-    if not steps.any():
-        return tuple((weights @ curves / weights.sum()).tolist())
-    turns = np.array(sorted(set(steps.tolist())))
-    turned = _turned(np.where(steps == turns[:, None], weights, 0.0) @ curves, turns * SAME_AXIS_DEG)
-    return tuple((turned.sum(axis=0) / weights.sum()).tolist())
-
-
-def _turned(curves: Values, turns_deg: Values) -> Values:
-    """Curves of bearings (m, n) with all bearings of each turned (m), on a line between their values."""
-    steps = np.arange(BEARINGS) - turns_deg[:, None] / BEARING_STEP_DEG
-    below = np.floor(steps)
-    share, place = steps - below, below.astype(np.intp)
-    rows = np.arange(len(curves))[:, None]
-    low, high = curves[rows, place % BEARINGS], curves[rows, (place + 1) % BEARINGS]
-    return np.asarray(low + share * (high - low))
-
-
-def _vote(kinds: Values, weights: Values) -> tuple[PointingGesture, float]:
-    """The gesture that most frames saw, and its share. A finger seen now and then outweighs "invisible"."""
-    votes = dict(zip(POINTING, np.bincount(kinds.astype(np.intp), weights, len(POINTING)).tolist(), strict=True))
-    total = sum(votes.values())
-    directed: PointingGesture = "point_left" if votes["point_left"] >= votes["point_right"] else "point_right"
-    if votes[directed] >= DIRECTED_SHARE * total:
-        return directed, votes[directed] / (votes["point_left"] + votes["point_right"])
-    return "invisible", votes["invisible"] / total
+    steps = np.rint(turns_deg / SAME_AXIS_DEG) * (SAME_AXIS_DEG / -BEARING_STEP_DEG)
+    whole = np.arange(math.floor(np.minimum.reduce(steps)), math.floor(np.maximum.reduce(steps)) + 2)
+    shares = np.maximum(0.0, 1 - np.abs(steps - whole[:, None]))
+    mean = (shares * (weights / total)) @ curves
+    turned = [np.concatenate([of[by:], of[:by]]) for of, by in zip(mean, (whole % BEARINGS).tolist(), strict=True)]
+    return tuple(sum(turned[1:], turned[0]).tolist())
 
 
 def _in_front(bearings_deg: Values) -> Values:

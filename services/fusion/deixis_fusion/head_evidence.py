@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Mapping
 
+import numpy as np
 from deixis_schemas.messages import HeadPose
 
-from .evidence import SIDES, STATUSES, HeadObservation
-from .frames import Flags, Frames
-from .robust import majority, median, median_and_spread, median_angle
+from .evidence import TURNED, HeadObservation
+from .frames import ROUNDING, Frames, Values
+from .robust import Middle, medians
 
 LEAST_HEAD_SHARE = 0.2
 
@@ -23,40 +24,38 @@ def head_now(pose: HeadPose | None) -> HeadObservation | None:
     return HeadObservation(pose.yaw_deg, pose.yaw_sigma_deg, pose.side)
 
 
-def head_over(frames: Frames, axis_deg: float | None = None) -> HeadObservation | None:
-    """The head over a stroke; none where it was tracked in too few frames to tell.
+class HeadFrames:
+    """The frames of a stroke that show the head within its range, or beyond it, and what these measured (4, n): `evidence.ROW`.
 
-    The yaw is from the direction `axis_deg` in the map, whichever way the camera was when it was seen; without it, from the
-    direction to the camera in each frame.
+    `measured` becomes not a number in the other frames. `turns_deg` (n) is added to the yaws of each.
     """
-    total, status = float(frames.weights.sum()), frames.column("status")
-    tracked, beyond = status == STATUSES.index("tracking"), status == STATUSES.index("out_of_range")
-    tracked_share = float(frames.weights[tracked].sum()) / total if total else 0.0
-    beyond_share = float(frames.weights[beyond].sum()) / total if total else 0.0
-    if tracked_share + beyond_share < LEAST_HEAD_SHARE:
-        return None
-    if beyond_share > tracked_share:
-        return _out_of_range(frames, beyond, beyond_share)
-    weights = frames.weights[tracked]
-    yaw, spread = median_angle((frames.column("yaw_deg") + frames.turns_to(axis_deg))[tracked], weights)
-    stated = median(frames.column("yaw_sigma_deg")[tracked], weights)
-    seen = HeadObservation(yaw, math.hypot(stated, spread), None, tracked_share)
-    return _with_pitch(seen, frames, tracked)
+
+    def __init__(self, frames: Frames, totals: Mapping[str, float], measured: Values, turns_deg: Values) -> None:
+        self._frames = frames
+        total = frames.weight
+        self._tracked = totals["tracking"] / total if total else 0.0
+        self._beyond = totals["out_of_range"] / total if total else 0.0
+        if totals["tracking"] != totals["frame"]:
+            tracking = frames.show("tracking")
+            measured[:, ~tracking] = np.nan
+            totals = frames.totals(frames.weights * tracking)
+        self._has_pitch = totals["has_pitch"] >= totals["tracking"] / 2 - ROUNDING
+        measured[0] += turns_deg
+
+    def observed(self, middle: Middle) -> HeadObservation | None:
+        """What they show together; none where the head was tracked in too few frames to tell."""
+        if self._tracked + self._beyond < LEAST_HEAD_SHARE - ROUNDING:
+            return None
+        if self._beyond > self._tracked + ROUNDING:
+            return _out_of_range(self._frames, self._beyond)
+        yaw, sigma, pitch, pitch_sigma = middle
+        if not self._has_pitch:
+            pitch = pitch_sigma = None
+        return HeadObservation(yaw, sigma, None, self._tracked, None, pitch, pitch_sigma)
 
 
-def _with_pitch(seen: HeadObservation, frames: Frames, tracked: Flags) -> HeadObservation:
-    """The same with the pitch, where it was told with its sigma in most frames."""
-    told = tracked & frames.tells("pitch_deg")
-    weights = frames.weights[told]
-    if not told.any() or weights.sum() < frames.weights[tracked].sum() / 2:
-        return seen
-    pitch, spread = median_and_spread(frames.column("pitch_deg")[told], weights)
-    stated = median(frames.column("pitch_sigma_deg")[told], weights)
-    return replace(seen, pitch_deg=pitch, pitch_sigma_deg=math.hypot(stated, spread))
-
-
-def _out_of_range(frames: Frames, beyond: Flags, share: float) -> HeadObservation:
-    sided, told = beyond & frames.tells("side"), beyond & frames.tells("beyond_deg")
-    side = majority(frames.column("side")[sided], frames.weights[sided])
-    limit = median(frames.column("beyond_deg")[told], frames.weights[told]) if told.any() else None
-    return HeadObservation(None, None, None if side is None else SIDES[side], share, limit)
+def _out_of_range(frames: Frames, share: float) -> HeadObservation:
+    weights = frames.weights * frames.column("out_of_range")
+    (limit,) = medians(np.where(weights > 0, frames.column("beyond_deg"), np.nan)[None], frames.early)
+    side = frames.side_of(TURNED, frames.totals(weights), weights)
+    return HeadObservation(None, None, side, share, None if math.isnan(limit) else limit)

@@ -7,7 +7,7 @@ single POIs, on the three regions of eq. 16, on nested sets and on the whole fra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -27,7 +27,7 @@ Sets = list[tuple[Flags, float]]
 class Focal(NamedTuple):
     """A set with mass: its members and the mass."""
 
-    members: Indices
+    members: Indices | tuple[int]
     mass: float
 
 
@@ -43,9 +43,14 @@ class MassVector:
     def normalised(single: Values, sets: Iterable[tuple[Flags, float]] = ()) -> MassVector:
         """The assignment proportional to these weights; vacuous where all are 0. Equal sets are added up."""
         flags, weights = tuple(zip(*sets, strict=True)) or ((), ())
-        return _normalised(
-            single, np.array(flags, dtype=np.bool_).reshape(-1, len(single)), np.array(weights, dtype=np.float64)
-        )
+        sets_flags = np.array(flags, dtype=np.bool_).reshape(-1, len(single))
+        return MassVector.weighed(single, sets_flags, np.array(weights, dtype=np.float64))
+
+    @staticmethod
+    def weighed(single: Values, sets: Flags, weights: Values) -> MassVector:
+        """The same of sets as flags (k, n) with their weights (k)."""
+        gathered, total = _gathered(single, sets, weights)
+        return gathered.divided(total) if total > 0 and math.isfinite(total) else MassVector.vacuous(len(single))
 
     @staticmethod
     def vacuous(size: int) -> MassVector:
@@ -75,7 +80,7 @@ class MassVector:
     @cached_property
     def sizes(self) -> Indices:
         """How many members each of the larger sets has (k)."""
-        return np.asarray(self.members.sum(axis=1))
+        return np.asarray(np.add.reduce(self.members, axis=1))
 
     @cached_property
     def unknown(self) -> float:
@@ -101,19 +106,19 @@ class MassVector:
         """Shafer's discounting: keep 1 - rate of every mass, give `rate` to the whole frame."""
         everything = np.ones((1, self.size), dtype=np.bool_)
         sets, masses = np.concatenate([self.members, everything]), np.append(self.masses * (1 - rate), rate)
-        return _normalised(self.single * (1 - rate), sets, masses)
+        return MassVector.weighed(self.single * (1 - rate), sets, masses)
 
     def largest(self, count: int) -> list[Focal]:
         """The sets of largest mass, single hypotheses among them."""
-        single, masses = self.single, self.masses.tolist()
+        single = self.single
+        best: Sequence[int] = range(len(single))
         if len(single) > count:
             candidates = (single >= np.partition(single, -count)[-count]).nonzero()[0]
-        else:
-            candidates = np.arange(len(single))
-        best = candidates[(-single[candidates]).argsort(kind="stable")[:count]]
-        alone = zip(best.tolist(), single[best].tolist(), strict=True)
-        found = [(-mass, 1, i, best[k : k + 1]) for k, (i, mass) in enumerate(alone)]
-        for flags, mass in zip(self.members, masses, strict=True):
+            best = candidates[(-single[candidates]).argsort(kind="stable")[:count]].tolist()
+            single = single[best]
+        found: list[tuple[float, int, int, Indices | tuple[int]]]
+        found = [(-mass, 1, i, (i,)) for i, mass in zip(best, single.tolist(), strict=True)]
+        for flags, mass in zip(self.members, self.masses.tolist(), strict=True):
             named = flags.nonzero()[0]
             found.append((-mass, len(named), int(named[0]), named))
         found.sort(key=itemgetter(0, 1, 2))
@@ -145,17 +150,11 @@ def combine(first: MassVector, second: MassVector) -> Combined:
     return Combined(joint.divided(agreement), min(1.0, max(0.0, 1.0 - agreement)))
 
 
-def _normalised(single: Values, sets: Flags, weights: Values) -> MassVector:
-    """See `MassVector.normalised`; the sets as flags (k, n)."""
-    gathered, total = _gathered(single, sets, weights)
-    return gathered.divided(total) if total > 0 and math.isfinite(total) else MassVector.vacuous(len(single))
-
-
 def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector, float]:
     """These weights with equal sets added up, and their total. Sets without a member, or without weight, go."""
     larger: dict[bytes, float] = {}
     rows = []
-    for i, (size, weight) in enumerate(zip(sets.sum(axis=1).tolist(), weights.tolist(), strict=True)):
+    for i, (size, weight) in enumerate(zip(np.add.reduce(sets, axis=1).tolist(), weights.tolist(), strict=True)):
         if size == 1:
             single = single + weight * sets[i]
         elif size and weight > 0:
@@ -164,4 +163,4 @@ def _gathered(single: Values, sets: Flags, weights: Values) -> tuple[MassVector,
                 rows.append(i)
             larger[key] = larger.get(key, 0.0) + weight
     members = sets if len(rows) == len(sets) else sets[rows]
-    return MassVector(single, members, np.array([*larger.values()])), float(single.sum()) + sum(larger.values())
+    return MassVector(single, members, np.array([*larger.values()])), float(np.add.reduce(single)) + sum(larger.values())

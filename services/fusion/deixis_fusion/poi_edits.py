@@ -9,6 +9,7 @@ from typing import Any
 from deixis_runtime.queries import Edit, Query, Refused, check_names, key_matches
 from deixis_schemas.codec import MSGPACK, CodecError, Malformed, WrongType, WrongVersion, parse_json, unpack, validate
 from deixis_schemas.messages import MAX_TEXT, Message, Poi, RejectedEdit
+from deixis_schemas.plain_text import plain, shown
 
 from .registry import Change, Delete, Put, Registry, RegistryError
 
@@ -70,7 +71,7 @@ class PoiEdits:
             keys = ((self._prefix + poi.poi_id, poi) for poi in self._registry.pois())
             return [(key, poi) for key, poi in keys if key_matches(query.key, key)]
         if operation not in OPERATIONS:
-            raise Refused(f"op: '{operation[:40]}' is none of {', '.join(OPERATIONS)}")
+            raise Refused(f"op: '{shown(operation[:40])}' is none of {', '.join(OPERATIONS)}")
         try:
             changes = self._changes(operation, query, now_ns)
             results = self._registry.apply(changes, all_or_none=True)
@@ -83,7 +84,10 @@ class PoiEdits:
         return [(self._prefix + poi.poi_id, poi) for poi in stored]
 
     def _changes(self, operation: str, query: Query, now_ns: int) -> list[Change]:
-        by = query.parameters.get("by", "")[:MAX_BY]
+        try:
+            by = plain(query.parameters.get("by", "")[:MAX_BY])
+        except ValueError as error:
+            raise EditError(f"by: {error}") from None
         if operation == "put_all":
             return [Put(poi) for poi in self._many(query, by, now_ns)]
         return [self._change(operation, query.key, query.payload or b"", query.encoding, now_ns, by)]
@@ -91,7 +95,7 @@ class PoiEdits:
     def _many(self, query: Query, by: str, now_ns: int) -> list[Poi]:
         """The POIs of a payload by their ids. Raises EditError that names POI and field."""
         if query.key != f"{self._prefix}*":
-            raise EditError(f"key: '{query.key[:200]}' is not '{self._prefix}*', the key of all POIs")
+            raise EditError(f"key: '{shown(query.key[:200])}' is not '{self._prefix}*', the key of all POIs")
         content = _content(query.payload or b"", query.encoding)
         return [_stamped(_poi_of(poi_id, fields), by, now_ns) for poi_id, fields in content.items()]
 
@@ -109,7 +113,7 @@ def poi_id_of(prefix: str, key: str) -> str:
     """The id that is all there is after the prefix. Raises EditError where the key names no single POI."""
     poi_id = key.removeprefix(prefix)
     if not key.startswith(prefix) or not poi_id or any(mark in poi_id for mark in "/*$"):
-        raise EditError(f"key: '{key[:200]}' names no single POI")
+        raise EditError(f"key: '{shown(key[:200])}' names no single POI")
     return poi_id
 
 
@@ -135,13 +139,13 @@ def _stamped(poi: Poi, by: str, now_ns: int) -> Poi:
 
 def _poi_of(poi_id: str, fields: object) -> Poi:
     if not isinstance(fields, dict):
-        raise EditError(f"{poi_id[:80]}: not an object but {type(fields).__name__}")
+        raise EditError(f"{shown(poi_id[:80])}: not an object but {type(fields).__name__}")
     try:
         poi = validate(Poi, {"poi_id": poi_id} | fields)
     except CodecError as error:
-        raise EditError(f"{poi_id[:80]}: {error}") from None
+        raise EditError(f"{shown(poi_id[:80])}: {error}") from None
     if poi.poi_id != poi_id:
-        raise EditError(f"poi_id: '{poi.poi_id}', but it stands under '{poi_id[:80]}'")
+        raise EditError(f"poi_id: '{poi.poi_id}', but it stands under '{shown(poi_id[:80])}'")
     return poi
 
 

@@ -11,8 +11,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from deixis_schemas.codec import CodecError, decode_json
+from deixis_schemas.codec import CodecError, decode_json, parse_json, validate
 from deixis_schemas.messages import MAX_REGISTERED, NAME_PATTERN, Poi
+from deixis_schemas.plain_text import cleaned, shown
 
 FORMAT = 1
 BUSY_MS = 500
@@ -219,7 +220,7 @@ class Registry:
         pois = {}
         for poi_id, content in self._db.execute(query):
             try:
-                pois[poi_id] = decode_json(Poi, content)
+                pois[poi_id] = _stored(content)
             except (CodecError, TypeError) as error:
                 raise CorruptError(f"registry {self.path}: the entry '{poi_id}' is corrupt: {error}") from None
             if pois[poi_id].poi_id != poi_id:
@@ -257,6 +258,21 @@ def default_path(robot: str, site: Path) -> Path:
     return state / "deixis" / robot / f"{resolved.stem}-{digest}.sqlite"
 
 
+def _stored(content: str) -> Poi:
+    """The POI of an entry. Raises CodecError.
+
+    Names that an earlier version took may hold control characters: they are read as spaces, for that is no damage.
+    """
+    try:
+        return decode_json(Poi, content)
+    except CodecError:
+        fields = parse_json(content)
+        for name in ("name", "edited_by"):
+            fields[name] = cleaned(str(fields.get(name, "")))
+        fields["tags"] = [cleaned(str(tag)) for tag in fields.get("tags", ())]
+        return validate(Poi, fields)
+
+
 def _put(pois: dict[str, Poi], poi: Poi) -> tuple[Poi, Statement]:
     if poi.poi_id not in pois and len(pois) >= MAX_REGISTERED:
         raise RegistryError(f"poi_id: the registry is full, it holds {MAX_REGISTERED} POIs")
@@ -266,7 +282,7 @@ def _put(pois: dict[str, Poi], poi: Poi) -> tuple[Poi, Statement]:
 
 def _delete(pois: dict[str, Poi], poi_id: str) -> tuple[Poi, Statement]:
     if poi_id not in pois:
-        raise RegistryError(f"poi_id: there is no POI '{poi_id[:80]}'")
+        raise RegistryError(f"poi_id: there is no POI '{shown(poi_id[:80])}'")
     return pois.pop(poi_id), ("DELETE FROM pois WHERE poi_id = ?", (poi_id,))
 
 

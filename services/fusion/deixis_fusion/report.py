@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
 
-import numpy as np
 from deixis_schemas.messages import MAX_LISTED, MAX_TEXT, OfFrame, PersonBelief, Poi, Producer, Target
 
 from .assessment import Assessment
@@ -191,13 +190,12 @@ def _source(
 
 def _focal_sets(assignment: MassVector, seen: Sequence[Candidate]) -> list[Content]:
     """The sets of largest mass, each with its first members."""
-    largest, left = assignment.largest(MAX_LISTED), MAX_MEMBERS
-    named = []
+    largest, named, counts = assignment.largest(MAX_LISTED), list[int](), list[int]()
     for focal in largest:
-        named.append(focal.members[: min(left, MAX_LISTED)])
-        left -= len(named[-1])
-    ids = iter(ids_at(seen, np.concatenate(named)))
+        counts.append(min(MAX_MEMBERS - len(named), MAX_LISTED, len(focal.members)))
+        named.extend(focal.members[: counts[-1]])
+    ids = iter(ids_at(seen, named))
     return [
-        {"poi_ids": list(islice(ids, len(of))), "size": len(focal.members), "mass": focal.mass}
-        for focal, of in zip(largest, named, strict=True)
+        {"poi_ids": list(islice(ids, count)), "size": len(focal.members), "mass": focal.mass}
+        for focal, count in zip(largest, counts, strict=True)
     ]

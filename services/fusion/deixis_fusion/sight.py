@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import NormalDist
 from typing import NamedTuple, overload
 
@@ -49,6 +49,8 @@ LEAST_AWAY_M = 0.05
 WIDEST_SIGMA_DEG = 60.0
 # Sight lines are looked along anew where the person has moved by more: less than what hangs on a wall stands off it.
 HELD_M = 0.02
+# Places from which bearings are kept: those of a walk, until its parts are others.
+KEPT_PLACES = 64
 
 
 class Points(NamedTuple):
@@ -82,13 +84,15 @@ class Bearings(NamedTuple):
 class Sight(Sequence[Candidate]):
     """The POIs in question and their bearings. `points` and `chosen` (which of them are in sight) allow for other places.
 
-    `place` is where they are seen from; none where bearings alone are known.
+    `place` is where they are seen from; none where bearings alone are known. `kept` are their bearings in all cases from other
+    places, as they are asked for.
     """
 
     bearings: Bearings
     points: Points
     chosen: Indices
     place: PersonPlace | None = None
+    kept: dict[PersonPlace, Singles] = field(default_factory=dict)
 
     @staticmethod
     def of(candidates: Sequence[Candidate]) -> Sight:
@@ -98,17 +102,28 @@ class Sight(Sequence[Candidate]):
         likeliest = np.array([candidate.bearing_deg for candidate in candidates], dtype=np.float64)
         sigma = np.array([candidate.bearing_sigma_deg for candidate in candidates], dtype=np.float64)
         cases = likeliest + DISTANCE_ERRORS[:, None] * sigma
+        cases -= 360 * np.rint(cases / 360)
         bearings = Bearings(likeliest, sigma, cases.astype(np.float32))
         points = Points([candidate.poi for candidate in candidates], np.zeros((len(sigma), 3)), np.zeros(len(sigma)))
         return Sight(bearings, points, np.arange(len(sigma)))
 
     def cases_from(self, places: Sequence[PersonPlace], part: Indices | slice, count: int = CASES) -> Singles:
-        """Bearings of a part of these POIs in all cases (v, CASES, n): from where they are seen now or, in `count` cases, from
-        these v places.
+        """Bearings of a part of these POIs, or of all, in all cases (v, CASES, n): from where they are seen now or, in `count`
+        cases, from these v places.
         """
         if not places:
             return self.bearings.cases[None, :, part]
+        if isinstance(part, slice):
+            return np.array([self._all_from(place) for place in places])
         return _cases(places, _Turned.of(places, self.points, self.chosen[part]), count)
+
+    def _all_from(self, place: PersonPlace) -> Singles:
+        """Of all in all cases, from there: of a walk only where the person stands now is new in each frame."""
+        if place is self.place:
+            return self.bearings.cases
+        if place not in self.kept:
+            self.kept[place] = _cases([place], _Turned.of([place], self.points, self.chosen), CASES)[0]
+        return self.kept[place]
 
     def poi(self, i: int) -> Poi:
         """The i-th POI in sight."""
@@ -155,6 +170,7 @@ class Lookout:
         self._eye = (0.0, 0.0)
         self._hidden: Indices = np.zeros(0, dtype=np.intp)
         self._index: Indices = np.zeros(0, dtype=np.intp)
+        self._bearings: dict[PersonPlace, Singles] = {}
 
     @property
     def hidden(self) -> Indices:
@@ -165,11 +181,16 @@ class Lookout:
         """What is in sight from there."""
         eye = (place.position_m[0], place.position_m[1])
         same = self._kept is not None and self._kept[0] is points and self._kept[1] is walls
-        if not same or math.dist(eye, self._eye) > HELD_M:
+        if not same or (len(walls) and math.dist(eye, self._eye) > HELD_M):
             hidden = walls.hide(eye, points.xy, self._clearance_m, points.extent / 2 + self._clearance_m)
-            self._hidden, self._index = np.flatnonzero(hidden), np.flatnonzero(~hidden)
+            in_sight = np.flatnonzero(~hidden)
+            if not same or not np.array_equal(in_sight, self._index):
+                self._bearings = {}
+            self._hidden, self._index = np.flatnonzero(hidden), in_sight
             self._kept, self._eye = (points, walls), eye
-        return Sight(bearings_from(place, points, self._index), points, self._index, place)
+        if len(self._bearings) > KEPT_PLACES:
+            self._bearings = {}
+        return Sight(bearings_from(place, points, self._index), points, self._index, place, self._bearings)
 
 
 class _Turned(NamedTuple):
@@ -187,10 +208,11 @@ class _Turned(NamedTuple):
     def of(places: Sequence[PersonPlace], points: Points, index: Indices) -> _Turned:
         """These POIs for persons there."""
         camera_x, camera_y, cos, sin, distance = np.array([_axis(place) for place in places]).T[:, :, None]
-        xyz = points.xyz[index]
-        x, y = xyz[:, 0] - camera_x, xyz[:, 1] - camera_y
+        x, y, _ = points.xyz[index].T
+        x, y = x - camera_x, y - camera_y
         ahead, left = cos * x + sin * y, cos * y - sin * x
-        away = np.maximum(np.hypot(ahead + distance, left), LEAST_AWAY_M)
+        away = np.hypot(ahead + distance, left)
+        np.maximum(away, LEAST_AWAY_M, out=away)
         return _Turned(ahead, left, away, points.extent[index], distance)
 
 
@@ -209,10 +231,12 @@ def bearings_from(place: PersonPlace, points: Points, index: Indices) -> Bearing
     From the direction person -> camera, counter-clockwise from above (REP-103).
     """
     turned = _Turned.of([place], points, index)
-    left, away = turned.left[0], turned.away[0]
-    likeliest = np.degrees(np.arctan2(left, turned.ahead[0] + turned.distance[0]))
-    across = np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12))
-    sigma = np.minimum(WIDEST_SIGMA_DEG, np.degrees(np.arctan2(across, away)))
+    (left,), (ahead,), (away,), (distance,) = turned.left, turned.ahead, turned.away, turned.distance
+    likeliest = np.arctan2(left, ahead + distance)
+    likeliest *= math.degrees(1)
+    sigma = np.arctan2(np.hypot(place.sigma_m * left / away, turned.extent / math.sqrt(12)), away)
+    sigma *= math.degrees(1)
+    np.minimum(sigma, WIDEST_SIGMA_DEG, out=sigma)
     return Bearings(likeliest, sigma, _cases([place], turned, CASES)[0])
 
 

@@ -18,6 +18,7 @@ from deixis_schemas.messages import (
     SourceState,
     State,
 )
+from deixis_schemas.plain_text import shown
 
 from .fusion import Fusion
 from .poi_edits import PoiEdits
@@ -41,7 +42,7 @@ class Asked:
         top = _number(parameters, "top", 1, MAX_POIS)
         poi_id = parameters.get("poi")
         if poi_id is not None and (not re.fullmatch(NAME_PATTERN, poi_id) or registry.get(poi_id) is None):
-            raise Refused(f"poi: there is no POI '{poi_id[:80]}'")
+            raise Refused(f"poi: there is no POI '{shown(poi_id[:80])}'")
         return Asked(Rows(rows if top is None else top, poi_id, MAX_LISTED), _number(parameters, "person", 0, 2**63 - 1))
 
     def wants(self, person_id: int) -> bool:
@@ -92,5 +93,5 @@ def _number(parameters: Mapping[str, str], name: str, least: int, most: int) -> 
     if text is None:
         return None
     if not re.fullmatch("[0-9]{1,19}", text) or not least <= int(text) <= most:
-        raise Refused(f"{name}: '{text[:40]}' is not a whole number from {least} to {most}")
+        raise Refused(f"{name}: '{shown(text[:40])}' is not a whole number from {least} to {most}")
     return int(text)

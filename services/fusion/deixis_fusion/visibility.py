@@ -38,6 +38,9 @@ class Walls:
         ends = np.array(walls, dtype=np.float64).reshape(-1, 2, 2)
         self._from, self._to = ends[:, 0] @ np.array([1, 1j]), ends[:, 1] @ np.array([1, 1j])
 
+    def __len__(self) -> int:
+        return len(self._from)
+
     def hide(self, eye: Point2, points: Values, clearance_m: float, reach_m: Values | None = None) -> npt.NDArray[np.bool_]:
         """Which of the points (n, 2), map frame, a wall hides from the eye.
 

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
-from typing import TypeVar
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from .config import HandConfig, HeadConfig
-from .confusion import HandConfusion
-from .curves import BEARINGS, Curve, Singles, at, hand_curve, head_curve
+from .confusion import HandConfusion, table_1
+from .curves import BEARINGS, Curve, Singles, at, bearing_curve, gesture_curve, head_curve
 from .evidence import Evidence, HandObservation, HeadObservation, View
-from .height import hand_likelihoods, head_likelihoods
+from .height import Heights, hand_likelihoods, head_likelihoods
 from .localisation import PersonPlace
+from .pointing import GESTURES
 from .sight import CASES, FEW_BELOW_DEG, FEW_CASES, Indices, Sight
 
 Values = npt.NDArray[np.float64]
-
-Seen = TypeVar("Seen", HandObservation, HeadObservation)
 
 NOTHING: Curve = np.zeros_like(BEARINGS)
 # POIs at a time, from one place: what is reckoned on the way then stays in the processor's cache.
 AT_A_TIME = 4096
 MANY = 500
+# The method of arrays takes twice as long for as few as there mostly are.
+_largest = np.maximum.reduce
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +51,13 @@ class Weighing:
 
         The conflict of Dempster's rule says little: .5 with 20 POIs in perfect agreement, .85 in contradiction.
         """
-        most = float(self.hand.max() * self.head.max())
-        return 1 - float((self.hand * self.head).max()) / most if most > 0 else 1.0
+        most = float(_largest(self.hand) * _largest(self.head))
+        return 1 - float(_largest(self.hand * self.head)) / most if most > 0 else 1.0
 
     def chances(self, tempering: float) -> Values:
         """The probability of each POI, all alike beforehand: the joint likelihood to the power of `tempering`, summing to 1."""
-        weights = (self.joint / self.joint.max()) ** tempering
-        return np.asarray(weights / weights.sum())
+        weights = (self.joint / _largest(self.joint)) ** tempering
+        return np.asarray(weights / np.add.reduce(weights))
 
 
 class SourceCurves:
@@ -71,16 +71,15 @@ class SourceCurves:
     def __init__(self, hand: HandConfig, head: HeadConfig, confusion: HandConfusion | None = None) -> None:
         """By the paper's table 1 or another."""
         self.hand_config, self.head_config = hand, head
-        self.of_hand: Callable[[HandObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_hand, hand, confusion))
-        self.of_head: Callable[[HeadObservation], Curve] = lru_cache(self.KEPT)(partial(_log_of_head, head))
+        self._of_gestures = {gesture: gesture_curve(gesture, hand, confusion or table_1()) for gesture in GESTURES}
+        self.of_hand: Callable[[HandObservation], Curve] = lru_cache(self.KEPT)(self._log_of_hand)
+        self.of_head: Callable[[HeadObservation], Curve] = lru_cache(self.KEPT)(self._log_of_head)
 
+    def _log_of_hand(self, seen: HandObservation) -> Curve:
+        return np.log(self._of_gestures[seen.gesture] * bearing_curve(seen, self.hand_config))
 
-def _log_of_hand(config: HandConfig, confusion: HandConfusion | None, seen: HandObservation) -> Curve:
-    return np.log(hand_curve(seen, config, confusion))
-
-
-def _log_of_head(config: HeadConfig, seen: HeadObservation) -> Curve:
-    return np.log(head_curve(seen, config))
+    def _log_of_head(self, seen: HeadObservation) -> Curve:
+        return np.log(head_curve(seen, self.head_config))
 
 
 def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
@@ -90,24 +89,26 @@ def weigh(evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
     (a geometric mean), so that a longer stroke is no surer than a short one.
     """
     views = evidence.views or (View(evidence.hand, evidence.head),)
-    of_sources = {
-        "hand": _told([(view.hand, view.hand_share) for view in views], evidence.hand, curves.of_hand),
-        "head": _told([(view.head, view.head_share) for view in views], evidence.head, curves.of_head),
-    }
-    told = {name: of_views for name, of_views in of_sources.items() if of_views is not None}
-    if not told:
+    names, stacked = _told(evidence, views, curves)
+    if not names:
         even = np.ones(len(seen))
         return Weighing(even, even, even, even)
     places = [view.place for view in views if view.place is not None]
-    found, stacked = np.empty((len(told) + 2, len(seen))), np.array([*told.values()])
+    found = np.empty((len(names) + 2, len(seen)))
     for part, count in _parts(seen, places):
         found[:, part] = _part(stacked, seen.cases_from(places, part, count))
-    by_name = dict(zip((*told, "joint", "most"), found, strict=True))
-    hand, head = (by_name[name] if name in told else np.ones(len(seen)) for name in ("hand", "head"))
-    joint, most = by_name["joint"], by_name["most"]
-    best = math.prod(stacked.max(axis=2).ravel().tolist())
-    floor = math.prod(told["head"].min(axis=1).tolist()) if "head" in told else 1.0
-    return _with_height(Weighing(hand, head, joint, most / best, floor), evidence, seen, curves)
+    by_name = dict(zip((*names, "joint", "most"), found, strict=True))
+    hand, head = (by_name[name] if name in names else np.ones(len(seen)) for name in ("hand", "head"))
+    best = math.prod(_largest(stacked, axis=2).ravel().tolist())
+    floor = math.prod(np.minimum.reduce(stacked[-1], axis=1).tolist()) if "head" in names else 1.0
+    joint, fit = by_name["joint"], by_name["most"] / best
+    # How well a POI fits is about directions: a height that is wrong makes no POI one that nobody can have meant.
+    hand_high, head_high = _heights(evidence, seen, curves)
+    if hand_high is not None:
+        hand, joint = hand * hand_high, joint * hand_high
+    if head_high is not None:
+        head, joint, floor = head * head_high, joint * head_high, floor * float(np.minimum.reduce(head_high))
+    return Weighing(hand, head, joint, fit, floor)
 
 
 def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices | slice, int]]:
@@ -129,25 +130,18 @@ def _parts(seen: Sight, places: Sequence[PersonPlace]) -> Iterator[tuple[Indices
             yield which[start : start + at_a_time], count
 
 
-def _with_height(weighed: Weighing, evidence: Evidence, seen: Sight, curves: SourceCurves) -> Weighing:
-    """The same with how high hand and head go, where that was measured and from one place (`height.py`).
-
-    How well a POI fits is about directions: a height that is wrong makes no POI one that nobody can have meant.
-    """
+def _heights(evidence: Evidence, seen: Sight, curves: SourceCurves) -> tuple[Values | None, Values | None]:
+    """The likelihoods of how high hand and head go (n each), where that was measured and from one place (`height.py`)."""
     hand, head = evidence.hand, evidence.head
     by_hand = hand is not None and hand.elevation_deg is not None
     by_head = head is not None and head.pitch_deg is not None
     if not (by_hand or by_head) or evidence.views or seen.place is None:
-        return weighed
-    xyz, extent = seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen]
-    of_hand = hand_likelihoods(hand, seen.place, xyz, extent, curves.hand_config) if hand is not None else None
-    if of_hand is not None:
-        weighed = replace(weighed, hand=weighed.hand * of_hand, joint=weighed.joint * of_hand)
-    of_head = head_likelihoods(head, seen.place, xyz, extent, curves.head_config) if head is not None else None
-    if of_head is not None:
-        floor = weighed.head_floor * float(of_head.min())
-        weighed = replace(weighed, head=weighed.head * of_head, joint=weighed.joint * of_head, head_floor=floor)
-    return weighed
+        return None, None
+    heights = Heights.of(seen.place, seen.points.xyz[seen.chosen], seen.points.extent[seen.chosen])
+    return (
+        hand_likelihoods(hand, heights, curves.hand_config) if hand is not None else None,
+        head_likelihoods(head, seen.place, heights, curves.head_config) if head is not None else None,
+    )
 
 
 def _part(told: Values, cases: Singles) -> Values:
@@ -155,25 +149,35 @@ def _part(told: Values, cases: Singles) -> Values:
 
     `told` are the sources' curves in v views (s, v, 360).
     """
-    of_sources = at(told, cases).prod(axis=1)
-    joint = of_sources.prod(axis=0)
-    return np.concatenate([of_sources.mean(axis=1), joint.mean(axis=0)[None], joint.max(axis=0)[None]])
+    of_views = at(told, cases)
+    of_sources = np.multiply.reduce(of_views, axis=1) if told.shape[1] > 1 else of_views[:, 0]
+    joint = np.multiply.reduce(of_sources, axis=0)
+    sums = np.concatenate([np.add.reduce(of_sources, axis=1), np.add.reduce(joint)[None]])
+    return np.concatenate([sums / np.float32(len(joint)), _largest(joint)[None]])
 
 
-def _told(
-    seen: Sequence[tuple[Seen | None, float]],
-    whole: HandObservation | HeadObservation | None,
-    curve_of: Callable[[Seen], Curve],
-) -> Values | None:
-    """What a source tells in each view, to the power of its share in all (v, 360); none where it tells nothing in any.
+def _told(evidence: Evidence, views: Sequence[View], curves: SourceCurves) -> tuple[list[str], Values]:
+    """The sources that tell something, hand before head; and what each tells in each view, to the power of its share in all
+    (s, v, 360).
 
-    `whole` is the same source over all views, by which it is trusted.
+    Each is trusted by what it shows over all views.
     """
-    if whole is None or not any(share for one, share in seen if one):
-        return None
-    shares = np.array([share if one else 0.0 for one, share in seen]) * _trust(whole.agreement)
-    logs = np.array([curve_of(one) if one else NOTHING for one, _ in seen])
-    return np.asarray(np.exp(shares[:, None] * logs))
+    names, logs, powers = [], list[Curve](), list[float]()
+    hand, head = evidence.hand, evidence.head
+    if hand is not None and any(view.hand and view.hand_share for view in views):
+        names.append("hand")
+        logs += [curves.of_hand(view.hand) if view.hand else NOTHING for view in views]
+        powers += [_trust(hand.agreement) * view.hand_share for view in views]
+    if head is not None and any(view.head and view.head_share for view in views):
+        names.append("head")
+        logs += [curves.of_head(view.head) if view.head else NOTHING for view in views]
+        powers += [_trust(head.agreement) * view.head_share for view in views]
+    if not names:
+        return names, np.empty((0, len(views), len(NOTHING)))
+    told = np.concatenate(logs).reshape(-1, len(NOTHING))
+    told *= np.array(powers)[:, None]
+    np.exp(told, out=told)
+    return names, told.reshape(len(names), len(views), len(NOTHING))
 
 
 def _trust(agreement: float) -> float:
