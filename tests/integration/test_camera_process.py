@@ -262,7 +262,7 @@ def test_lockstep_goes_on_without_answers_and_counts_them(endpoint: str, tmp_pat
         wait_for(watcher.at_end, "the end")
         wait_for(lambda: watcher.healths[-1].counters.get("lockstep_unanswered", 0) >= 4, "the count")
         assert [frame.seq for frame in watcher.frames] == [0, 1, 2, 3, 4], "each once, also unanswered"
-        assert camera.said.count("fusion did not answer") == 1, "said once in ten seconds"
+        assert camera.said.count("/fusion/belief: no answer to frame") == 1, "said once in ten seconds"
 
 
 def test_lockstep_waits_for_the_stages_that_answer(endpoint: str, tmp_path: Path) -> None:
