@@ -37,7 +37,7 @@ class StubNode:
         self.warnings: list[str] = []
         self.states: list[tuple[HealthState, str]] = []
         self.counters: Counter[str] = Counter()
-        self.robot = "stub"
+        self.robot = "r1"
         self._turns = iter(turns)
         self._first = True
         self._now: dict[str, str] = {}
@@ -45,7 +45,7 @@ class StubNode:
         self._inboxes: dict[type[Message], Inbox] = {}
 
     def subscribe(self, topic: Topic, **_bounds: int) -> Inbox:
-        return self._inboxes.setdefault(topic.type, Inbox(topic.key("r1")))
+        return self._inboxes.setdefault(topic.type, Inbox(topic.key(self.robot)))
 
     def publish(self, _topic: Topic) -> "StubNode":
         return self

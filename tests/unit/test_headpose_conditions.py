@@ -18,7 +18,7 @@ from deixis_headpose.estimator import HeadPoseEstimator
 from deixis_headpose.head import Pose
 from deixis_runtime.lens import Lens
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import HeadPose, KindProbabilities, Track
+from deixis_schemas.messages import HeadPose
 from deixis_simulation.arms import hanging_arm
 from deixis_simulation.avatars import HELD_OUT_AVATARS, Picture, load_avatar
 from deixis_simulation.body import Body, fit_body
@@ -33,6 +33,7 @@ from deixis_simulation.skeleton import SIDES, Posture, Skeleton, solve
 from deixis_simulation.skinning import skin
 from deixis_simulation.studio import behind, draw_camera, draw_rooms, empty_room, light_person
 from deixis_simulation.truth_head import MIRROR
+from face_track import face_track
 from simulation_ready import needs_renderer
 
 pytestmark = needs_renderer
@@ -131,27 +132,13 @@ def adults() -> list[Shown]:
 
 def answers(heads: Sequence[Shown], change: Callable[[Picture], Picture] = np.copy) -> list[HeadPose]:
     """What the stage says of each head after a few equal frames, its picture changed so."""
-    said = []
+    said, face = [], face_track(MIDDLE_PX, MIDDLE_PX, FACE_WIDTH_M * SIDE_PX / SIDE_M)
     for head in heads:
         estimator, picture = HeadPoseEstimator(HeadposeConfig()), change(head.picture)
         for number in range(FRAMES):
-            poses = estimator.update(picture, [track()], LENS, 1, number * FRAME_NS)
+            poses = estimator.update(picture, [face], LENS, 1, number * FRAME_NS)
         said += poses
     return said
-
-
-def track() -> Track:
-    """Of the face in the middle, of an adult's width."""
-    width = FACE_WIDTH_M * SIDE_PX / SIDE_M
-    return Track(
-        track_id=1,
-        person_id=1,
-        kind="face",
-        kind_probabilities=KindProbabilities(face=1.0),
-        centroid_px=(MIDDLE_PX, MIDDLE_PX),
-        bbox_px=(MIDDLE_PX - (width - 1) / 2, MIDDLE_PX - (width - 1) / 2, width, width),
-        velocity_px_s=(0, 0),
-    )
 
 
 def mean_error_deg(heads: Sequence[Shown], said: Sequence[HeadPose]) -> float:

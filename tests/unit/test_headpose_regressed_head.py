@@ -11,7 +11,8 @@ from deixis_headpose.regression import EARS_APART_M, Look, Regression
 from deixis_headpose.sight import HeadState, Sight, centre_of
 from deixis_runtime.lens import Pinhole
 from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import KindProbabilities, Track
+from deixis_schemas.messages import Track
+from face_track import face_track
 
 CAMERA = Pinhole(500.0, 319.5, 239.5)
 PICTURE = np.full((480, 640, 3), 90, np.uint8)
@@ -30,15 +31,7 @@ def followed(looks: list[Look | None]) -> list[HeadState]:
 
 
 def a_face(x: float = 300, y: float = 200, width: float = 60) -> Track:
-    return Track(
-        track_id=1,
-        person_id=1,
-        kind="face",
-        kind_probabilities=KindProbabilities(face=1.0),
-        centroid_px=(x, y),
-        bbox_px=(x - (width - 1) / 2, y - (width - 1) / 2, width, width),
-        velocity_px_s=(0, 0),
-    )
+    return face_track(x, y, width)
 
 
 class Shown(Regression):

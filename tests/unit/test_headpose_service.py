@@ -52,8 +52,8 @@ def test_tracks_of_frames_that_do_not_come_are_counted_and_health_names_both_key
     service.serve(node, HeadposeConfig(frames_kept=2))
     assert [state for state, _ in node.states] == ["ok", "ok", "degraded", "degraded", "ok"]
     reason = node.states[2][1]
-    assert "deixis/stub/tracker/tracks by tracker/t speaks of seq 0 of run 1" in reason
-    assert "no frame of deixis/stub/camera/frame: the last is seq 1002 of run 1" in reason
+    assert "deixis/r1/tracker/tracks by tracker/t speaks of seq 0 of run 1" in reason
+    assert "no frame of deixis/r1/camera/frame: the last is seq 1002 of run 1" in reason
     assert node.counters == {"tracks_without_frame": 4}
     assert len(lenses) == 1
 
@@ -62,7 +62,7 @@ def test_tracks_that_come_too_late_are_counted_apart_and_health_names_the_settin
     node = StubNode("headpose", [[frame(turn), *([tracks(turn - 3)] if turn >= 3 else [])] for turn in range(8)])
     service.serve(node, HeadposeConfig(frames_kept=2))
     assert node.states[-1][0] == "degraded"
-    assert "2 (frames_kept) of deixis/stub/camera/frame" in node.states[-1][1]
+    assert "2 (frames_kept) of deixis/r1/camera/frame" in node.states[-1][1]
     assert node.counters == {"tracks_skipped": 3}
     assert lenses == []
 
