@@ -33,7 +33,8 @@ else
 endif
 
 test: setup check
-	@$(BIN)/pytest
+	@# Two at a time; a file's tests stay together, for they share the system that they run.
+	@$(BIN)/pytest -n 2 --dist loadfile
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
