@@ -6,12 +6,14 @@ import os
 import socket
 import time
 from collections import deque
+from collections.abc import Sequence
 from statistics import median
 
-from deixis_schemas.messages import Health, HealthState, Producer
+from deixis_schemas.messages import ClockHealth, Health, HealthState, Producer
 
 from .inputs import Subscription
 from .outputs import Publisher
+from .versions import versions_of
 
 PERIOD_S = 1.0
 STEPS_OVER_S = 1.0
@@ -44,6 +46,7 @@ class Heartbeat:
         self.counters: dict[str, int] = {}
         self.notes: dict[str, str] = {}
         self._producer = producer
+        self._versions = versions_of(producer.stage)
         self._count = 0
         self._started_s = time.monotonic()
         self._next_s = self._started_s
@@ -62,7 +65,9 @@ class Heartbeat:
         self._count += 1
         self._next_s = time.monotonic() + PERIOD_S
 
-    def record(self, now_ns: int, inputs: list[Subscription], outputs: list[Publisher]) -> Health:
+    def record(
+        self, now_ns: int, inputs: list[Subscription], outputs: list[Publisher], clocks: Sequence[ClockHealth] = ()
+    ) -> Health:
         """The record as of now."""
         steps = self._steps.last_second_ms(time.monotonic())
         return Health(
@@ -83,6 +88,8 @@ class Heartbeat:
             outputs=[item.health() for item in outputs],
             counters=dict(self.counters),
             notes=list(self.notes.values())[:16],
+            versions=self._versions,
+            clocks=list(clocks),
         )
 
 

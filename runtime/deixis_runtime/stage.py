@@ -14,9 +14,10 @@ from typing import Any, TypeVar
 
 import zenoh
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import HealthState, Message, Producer
+from deixis_schemas.messages import Health, HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
+from .clock_watch import ClockWatch
 from .delivery import PROFILES
 from .heartbeat import Heartbeat
 from .inputs import Subscription
@@ -59,6 +60,7 @@ class Node:
         self._outputs: list[Publisher] = []
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
+        self._clocks: list[ClockWatch] = []
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._token: Any = None
@@ -118,6 +120,12 @@ class Node:
         queue = QueryQueue(topic, answer, self.wake, self.warn)
         self._declared.append(self._session.declare_queryable(topic.key(self.robot, **parts), queue.store))
         self._queries.append(queue)
+
+    def follow_clock(self, stage: str) -> ClockWatch:
+        """Compare the clock of this stage's host with ours from now on; said in health, and warned of where they differ."""
+        watch = ClockWatch(self._session, self.robot, stage)
+        self._clocks.append(watch)
+        return watch
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
@@ -203,7 +211,8 @@ class Node:
         self._heartbeat.beat()
         self._log_state()
         self._look_at_queues()
-        self._health.put(self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))
+        self._look_at_clocks()
+        self._health.put(self._record())
         if self._parent is not None and os.getppid() != self._parent:
             self.log.error("the supervisor is gone; stopping")
             self.stop()
@@ -211,12 +220,24 @@ class Node:
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
 
     def _answer_health(self, _query: Query) -> list[tuple[str, Message]]:
-        return [(self._health.key, self._heartbeat.record(self.now_ns(), self._inputs, self._outputs))]
+        return [(self._health.key, self._record())]
+
+    def _record(self) -> Health:
+        clocks = [known for watch in self._clocks if (known := watch.health()) is not None]
+        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks)
 
     def _declare_alive(self) -> None:
         # Only now, when all subscribers stand: whoever waits for the token may publish at once.
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
+
+    def _look_at_clocks(self) -> None:
+        for watch in self._clocks:
+            watch.turn()
+            complaint = watch.complaint()
+            self.note(f"clock {watch.stage}", complaint)
+            if complaint:
+                self.warn(f"clock {watch.stage}", f"{watch.key}: {complaint}; run NTP or chrony on both")
 
     def _look_at_queues(self) -> None:
         """What was lost or dropped before the stage saw it is said in health."""

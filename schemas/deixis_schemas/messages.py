@@ -480,7 +480,17 @@ class Target(OfFrame):
     reason: Text
     started_ns: Nanoseconds
     ended_ns: Nanoseconds
-    latency_ms: float = Field(ge=0, description="Capture of the last frame used to publication; 0 in lockstep.")
+    latency_ms: float = Field(
+        ge=0,
+        description="Capture of the last frame used to publication, by the clock of the camera's host where that was compared "
+        "with fusion's; 0 in lockstep.",
+    )
+    latency_uncertain_ms: float | None = Field(
+        default=None,
+        ge=0,
+        description="By how much latency_ms may be wrong because the clocks of two hosts go into it. None where they were not "
+        "compared: then it is their plain difference, and means nothing where they differ. 0 in lockstep.",
+    )
 
 
 class RobotPose(Produced):
@@ -563,8 +573,20 @@ class OutputHealth(Part):
     rate_hz: float = Field(default=0.0, ge=0)
 
 
+class ClockHealth(Part):
+    """The clock of a stage's host beside that of the stage which says so, by questions and answers between the two."""
+
+    stage: Name = Field(description="Stage whose clock it is.")
+    host: Text = Field(description="Host of that stage.")
+    ahead_s: float = Field(description="How far that clock is ahead of ours; behind: negative.")
+    uncertain_s: float = Field(ge=0, description="By how much ahead_s may be wrong: half the quickest round trip, and drift.")
+
+
 class Health(Produced):
-    """Heartbeat of a stage. `count` advances only while its loop runs."""
+    """Heartbeat of a stage. `count` advances only while its loop runs.
+
+    `stamp_ns` is the time of the answer where it answers a get: clocks of hosts are compared by it.
+    """
 
     count: Count
     state: HealthState
@@ -580,6 +602,14 @@ class Health(Produced):
     outputs: list[OutputHealth] = Field(default_factory=list, max_length=16)
     counters: dict[str, Count] = Field(default_factory=dict, max_length=64, description="Counters of the stage's own.")
     notes: list[Text] = Field(default_factory=list, max_length=16, description="Conditions, e.g. assumed intrinsics.")
+    versions: dict[str, Annotated[str, Field(max_length=64)]] = Field(
+        default_factory=dict,
+        max_length=16,
+        description="Versions of what the process runs, by distribution: deixis-schemas, ...",
+    )
+    clocks: list[ClockHealth] = Field(
+        default_factory=list, max_length=8, description="Clocks that the stage compares with its own, for their stamps."
+    )
 
 
 TYPES: dict[str, type[Message]] = {

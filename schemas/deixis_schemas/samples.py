@@ -57,6 +57,7 @@ _TARGET = m.Target.derive(
     started_ns=STAMP_NS - 1_500_000_000,
     ended_ns=STAMP_NS,
     latency_ms=31.0,
+    latency_uncertain_ms=1.0,
 )
 _PERSON = m.PersonBelief(
     person_id=0,
@@ -198,5 +199,7 @@ SAMPLES: tuple[m.Message, ...] = (
         outputs=[m.OutputHealth(key="deixis/r1/tracker/tracks", published=358, rate_hz=29.8)],
         counters={"faces_detected": 40},
         notes=["the picture is scaled down"],
+        versions={"deixis-schemas": "0.1.0", "deixis-tracker": "0.1.0", "eclipse-zenoh": "1.10.2"},
+        clocks=[m.ClockHealth(stage="camera", host="robot", ahead_s=-0.012, uncertain_s=0.001)],
     ),
 )

@@ -89,7 +89,8 @@ class Fusion:
     """Follows persons from frame to frame.
 
     The answer to a frame depends on the frames of its run before it and on what was set; not on a clock. `persons` is the
-    standing of each in the last frame, `recent` are the last final answers.
+    standing of each in the last frame, `recent` are the last final answers. `clock_uncertain_ns`: by how much the times given
+    as `now_ns` may be off the clock of the frames' stamps; none where that is not known.
     """
 
     def __init__(self, config: FusionConfig, producer: Producer) -> None:
@@ -104,6 +105,7 @@ class Fusion:
         self._followed: dict[int, _Person] = {}
         self._moment: _Moment | None = None
         self.robot = RobotPath(config.place.robot_pose_max_age_s)
+        self.clock_uncertain_ns: int | None = None
         self.persons: list[PersonReport] = []
         self.recent: deque[TargetReport] = deque(maxlen=KEPT_TARGETS)
 
@@ -255,6 +257,7 @@ class Fusion:
             final=final,
             assessment=assessment,
             now_ns=now_ns,
+            uncertain_ns=self.clock_uncertain_ns,
         )
         if final:
             self.recent.append(report)

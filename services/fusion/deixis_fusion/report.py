@@ -73,7 +73,10 @@ class PersonReport(NamedTuple):
 
 @dataclass(frozen=True)
 class TargetReport:
-    """One answer of an episode, from which messages of any length are made. `frame` names the producer."""
+    """One answer of an episode, from which messages of any length are made. `frame` names the producer.
+
+    `now_ns` is by the clock of the camera's host, give or take `uncertain_ns`; none where the clocks were not compared.
+    """
 
     frame: OfFrame
     person_id: int
@@ -83,6 +86,7 @@ class TargetReport:
     final: bool
     assessment: Assessment
     now_ns: int | None
+    uncertain_ns: int | None = None
 
     def message(self, rows: Rows) -> Target:
         """The answer as a message."""
@@ -107,7 +111,13 @@ class TargetReport:
             started_ns=self.started_ns,
             ended_ns=self.ended_ns,
             latency_ms=0.0 if self.now_ns is None else max(0.0, (self.now_ns - self.frame.stamp_ns) / 1e6),
+            latency_uncertain_ms=self._latency_uncertain_ms(),
         )
+
+    def _latency_uncertain_ms(self) -> float | None:
+        if self.now_ns is None:
+            return 0.0
+        return None if self.uncertain_ns is None else self.uncertain_ns / 1e6
 
 
 # --- rows -------------------------------------------------------------------------------------------------------------

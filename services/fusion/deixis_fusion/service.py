@@ -50,6 +50,7 @@ class FusionService:
         self._camera = node.subscribe(topics.CAMERA_INFO, depth=4)
         self._robot = node.subscribe(topics.ROBOT_POSE, depth=DEPTH)
         self._poi_edits = node.subscribe_edits(topics.POI.key(node.robot, id="**"))
+        self._camera_clock = None if node.lockstep else node.follow_clock(topics.FRAME.stage)
         self._belief = node.publish(topics.BELIEF)
         self._target = node.publish(topics.TARGET)
         # Keys that name no single POI, too: an edit there is refused in words, not met with silence.
@@ -170,8 +171,15 @@ class FusionService:
     # --- outputs ------------------------------------------------------------------------------------------------------
 
     def _now_ns(self) -> int | None:
-        """Wall clock; none in lockstep, where time stands still and two runs have to be equal."""
-        return None if self._node.lockstep else self._node.now_ns()
+        """Wall clock of the camera's host, by which frames are stamped, as far as it was compared with ours.
+
+        None in lockstep, where time stands still and two runs have to be equal.
+        """
+        if self._camera_clock is None:
+            return None
+        offset = self._camera_clock.offset()
+        self._fusion.clock_uncertain_ns = None if offset is None else offset.uncertain_ns
+        return self._node.now_ns() + (0 if offset is None else offset.correction_ns)
 
     def _answer_frame(self, frame: JoinedFrame, now_s: float) -> None:
         if self._pois_changed:
