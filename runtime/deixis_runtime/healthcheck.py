@@ -1,14 +1,14 @@
-"""Whether a service of this container works: `python -m deixis_runtime.healthcheck router|STAGE`.
+"""Whether a service of this host works: `python -m deixis_runtime.healthcheck router|STAGE`.
 
-Of the router, that it accepts on its socket; of a stage, that its loop answers a get of its health and says it has not failed.
-Prints what is wrong and exits 1.
+Of the router, that it opens a session on its socket (one that is stopped still accepts connections); of a stage, that its loop
+answers a get of its health and says it has not failed. Prints what is wrong and exits 1.
 """
 
 from __future__ import annotations
 
 import argparse
+import errno
 import os
-import socket
 import sys
 
 import zenoh
@@ -24,13 +24,13 @@ TIMEOUT_S = 2.0
 
 def router_problem(path: str) -> str:
     """What is wrong with the router on this socket; empty if nothing."""
-    with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(TIMEOUT_S)
-        try:
-            probe.connect(path)
-        except OSError as error:
-            return f"router: {path}: {error.strerror or error}"
-    return ""
+    if not os.path.exists(path):
+        return f"router: {path}: {os.strerror(errno.ENOENT)}"
+    try:
+        with open_client(f"unixsock-stream/{path}", shared_memory=False):
+            return ""
+    except Unreachable as error:
+        return f"router: {error}"
 
 
 def stage_problem(stage: str, robot: str, path: str) -> str:

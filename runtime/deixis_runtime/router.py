@@ -10,11 +10,14 @@ import json
 import logging
 import os
 import shutil
+import time
 from pathlib import Path
 
 import zenoh
 
 from .interrupts import Interrupts
+from .limit import RateLimit
+from .manager import Manager
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
 
@@ -81,6 +84,8 @@ def _watch_links(
     session: zenoh.Session, listen: list[str], connect: list[str], interrupts: Interrupts, parent: int | None
 ) -> None:
     linked: bool | None = None
+    manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    _tell_manager(manager, limit, "routing")
     while not interrupts.wait(CHECK_S):
         if parent is not None and os.getppid() != parent:
             log.error("the supervisor is gone; stopping")
@@ -91,6 +96,15 @@ def _watch_links(
             level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
             log.log(level, text, ", ".join(connect))
         linked = now
+        _tell_manager(manager, limit, "linked" if linked else "no link to another router")
+
+
+def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:
+    try:
+        manager.tell(time.monotonic(), status)
+    except OSError as error:
+        if limit.allow("manager", time.monotonic()) is not None:
+            log.warning("NOTIFY_SOCKET: nobody hears that the router is alive: %s", error.strerror)
 
 
 def _remove_socket_folders(listen: list[str]) -> None:

@@ -23,6 +23,7 @@ from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
 from .liveliness import AliveStages
+from .manager import Manager
 from .outputs import Publisher, oversize
 from .queries import Answer, EditQueue, Query, QueryQueue
 from .session import Unreachable, exit_now, first_line, open_client
@@ -52,6 +53,8 @@ class Node:
         self._session = session
         self._endpoint = options.connect
         self._parent = os.getppid() if options.supervised else None
+        # Under our own supervisor the manager is the supervisor's, and hears the supervisor alone.
+        self._manager = Manager({} if options.supervised else os.environ)
         self._event = threading.Event()
         self._limit = RateLimit()
         self._logged_state: HealthState = "ok"
@@ -143,6 +146,7 @@ class Node:
             queue.answer_all()
         if self._heartbeat.due_in_s() == 0.0:
             self._beat()
+        self._tell_manager()
         return not self.stopping
 
     def wake(self) -> None:
@@ -218,6 +222,14 @@ class Node:
             self.stop()
         if not self._session.info.routers_zid():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
+
+    def _tell_manager(self) -> None:
+        heartbeat = self._heartbeat
+        status = f"{heartbeat.state}: {heartbeat.reason}" if heartbeat.reason else heartbeat.state
+        try:
+            self._manager.tell(time.monotonic(), status)
+        except OSError as error:
+            self.warn("manager", f"NOTIFY_SOCKET: nobody hears that this stage is alive: {error.strerror}")
 
     def _answer_health(self, _query: Query) -> list[tuple[str, Message]]:
         return [(self._health.key, self._record())]

@@ -3,7 +3,9 @@
 import socket
 
 import pytest
+import zenoh
 from deixis_runtime.healthcheck import health_problem, main, router_problem
+from deixis_runtime.router import router_config
 from deixis_schemas import codec
 from deixis_schemas.messages import Health
 from deixis_schemas.samples import SAMPLES
@@ -16,13 +18,17 @@ def problem(**changes):
     return health_problem(codec.encode(health), codec.encoding_of(Health))
 
 
-def test_a_router_that_listens_is_well(tmp_path):
+def test_a_router_that_routes_is_well_and_one_that_only_listens_is_not(tmp_path):
     path = str(tmp_path / "router.sock")
-    with socket.socket(socket.AF_UNIX) as listening:
-        listening.bind(path)
-        listening.listen()
+    config = router_config([f"unixsock-stream/{path}"], [])
+    config.insert_json5("transport/shared_memory/enabled", "false")  # this process would keep 16 MB of it
+    with zenoh.open(config):
         assert router_problem(path) == ""
-    assert "Connection refused" in router_problem(path)
+    mute = str(tmp_path / "mute.sock")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(mute)
+        listening.listen()
+        assert "no Zenoh router answers" in router_problem(mute)
 
 
 def test_a_router_that_is_not_there_is_named_with_its_socket(tmp_path, capsys):
