@@ -2,39 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
+from deixis_runtime.clock_offset import Offset
+from deixis_runtime.clock_watch import say_skew
+from deixis_runtime.finding import Finding
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Health, State
+from deixis_schemas.messages import CameraInfo, Health, InputHealth, OutputHealth, State
 from deixis_schemas.topics import By
 
 from .system import HEARD_ONLY, StageProcess, System
 
-Level = Literal["ok", "note", "wrong"]
-
-CLOCK_S = 0.3
 SLOW_SHARE = 0.7
 STALE_S = 2.0
 SETTLED_S = 5.0
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing found: whether it is wrong, what it is, and what to do."""
-
-    level: Level
-    what: str
-    advice: str = ""
+PER_FRAME = frozenset(topic.path for topic in topics.TOPICS if topic.by is By.FRAME)
+RELEASE = "Deixis"
+# What every tool that shows answers has to hear; the rest may be kept from it on purpose.
+NEEDED_BY_TOOLS = (topics.BELIEF.path,)
+SAME_VERSION = "install the same version of Deixis on both hosts; 'deixis doctor --json' on each names its own"
+CLOCK_ADVICE = "ages are judged all the same, but stamps of the two are not comparable: run NTP or chrony on both"
 
 
 @dataclass(frozen=True)
 class Listening:
-    """What was heard by listening: healths by stage, and whether an edit by get reaches fusion (none: not tried)."""
+    """What was heard by listening: healths by stage, and whether an edit by get reaches fusion (none: not tried).
+
+    `paths` are the topics listened to beside health, and whether anything came on each.
+    """
 
     healths: frozenset[str]
     edits_reach_fusion: bool | None
+    paths: Mapping[str, bool] = field(default_factory=dict)
 
 
 def findings(system: System, listening: Listening) -> list[Finding]:
@@ -44,6 +46,9 @@ def findings(system: System, listening: Listening) -> list[Finding]:
         *hung_stages(system),
         *ill_stages(system),
         *silenced(system, listening),
+        *kept_from_us(system, listening),
+        *unreadable(system),
+        *versions(system),
         *doubled(system),
         *camera_state(system.camera),
         *rates(system),
@@ -148,38 +153,128 @@ def rates(system: System) -> Iterator[Finding]:
 
 def _given_hz(health: Health) -> list[float]:
     """Rates of the inputs that come with each frame."""
-    per_frame = {topic.path for topic in topics.TOPICS if topic.by is By.FRAME}
-    return [item.rate_hz for item in health.inputs if "/".join(item.key.split("/")[2:]) in per_frame]
+    return [item.rate_hz for item in health.inputs if _path(item.key) in PER_FRAME]
 
 
 def inputs(system: System) -> Iterator[Finding]:
     """Keys that a stage should hear and does not, or refuses."""
     streaming = system.camera is not None and system.camera.state == "streaming" and not system.camera.lockstep
-    per_frame = {topic.path for topic in topics.TOPICS if topic.by is By.FRAME}
     for process in system.processes:
         for item in process.health.inputs if process.health else []:
-            path = "/".join(item.key.split("/")[2:])
-            if item.rejected:
-                advice = "its producer breaks the contract of schemas/contract/topics.md: mend that, or stop it"
-                yield Finding("wrong", f"{process.stage} refused {item.rejected} of {path}: {item.last_error}", advice)
-            young = process.health is None or process.health.uptime_s < SETTLED_S
-            if streaming and path in per_frame and not young and (item.age_s is None or item.age_s > STALE_S):
-                since = "ever" if item.age_s is None else f"for {item.age_s:.0f} s"
-                yield Finding("wrong", f"{process.stage} has heard no {path} {since}", "see what is said of its producer")
+            yield from _refused(process, item)
+            if streaming and _path(item.key) in PER_FRAME and _is_silent(process, item):
+                yield _silence(system, process, item)
+
+
+def _refused(process: StageProcess, item: InputHealth) -> Iterator[Finding]:
+    if item.rejected:
+        of_version = "this reader speaks" in item.last_error
+        mend = "its producer breaks the contract of schemas/contract/topics.md: mend that, or stop it"
+        what = f"{process.stage} refused {item.rejected} of {_path(item.key)}: {item.last_error}"
+        yield Finding("wrong", what, f"two versions of the contract meet: {SAME_VERSION}" if of_version else mend)
+
+
+def _is_silent(process: StageProcess, item: InputHealth) -> bool:
+    young = process.health is None or process.health.uptime_s < SETTLED_S
+    return not young and (item.age_s is None or item.age_s > STALE_S)
+
+
+def _silence(system: System, process: StageProcess, item: InputHealth) -> Finding:
+    """That a stage hears nothing on a key; and where both sides are seen, that the way between them keeps it."""
+    since = "ever" if item.age_s is None else f"for {item.age_s:.0f} s"
+    what = f"{process.stage} has heard no {_path(item.key)} {since}"
+    if item.too_old and item.rate_hz > 0:
+        return Finding(
+            "wrong", f"{what} that was young enough", "the link is too slow for it: lower camera.rate_hz, size or quality"
+        )
+    publishers = list(publishing(system, item.key))
+    if item.rejected or not publishers:
+        return Finding("wrong", what, "see what is said of its producer")
+    source, output = publishers[0]
+    told = f"{source.stage} says that it published {output.published} of them, {output.rate_hz:.0f}/s now"
+    ways = "the router" if _host(source) == _host(process) else f"the link from {_host(source)} to {_host(process)}"
+    advice = f"{ways} or its access control keeps {_path(item.key)}: compare access_control in the settings of the routers"
+    return Finding("wrong", f"{what}, but {told}", advice)
+
+
+def publishing(system: System, key: str) -> Iterator[tuple[StageProcess, OutputHealth]]:
+    """The processes that say that they publish on this key now."""
+    for process in system.processes:
+        for output in process.health.outputs if process.health else []:
+            if output.key == key and output.rate_hz > 0:
+                yield process, output
+
+
+def kept_from_us(system: System, listening: Listening) -> Iterator[Finding]:
+    """Topics that are published, and of which nothing comes to us: denied, or kept on the other host on purpose."""
+    for path, heard in listening.paths.items():
+        publishers = list(publishing(system, f"deixis/{system.robot}/{path}"))
+        if heard or not publishers:
+            continue
+        source, output = publishers[0]
+        what = f"{path}: {source.stage} publishes {output.rate_hz:.0f}/s of it, and we hear none"
+        needed = path in NEEDED_BY_TOOLS
+        yield Finding(
+            "wrong" if needed else "note",
+            what,
+            "access control on the way denies it to us" + ("" if needed else "; of no matter if that is meant"),
+        )
+
+
+def unreadable(system: System) -> Iterator[Finding]:
+    """Healths that were answered and that we cannot read."""
+    for refusal in system.refused:
+        yield Finding("wrong", f"{refusal.key}: its health cannot be read: {refusal.reason}", SAME_VERSION)
+
+
+def versions(system: System) -> Iterator[Finding]:
+    """Distributions that are not of the same version in all processes, ours included. Those that name none are left out."""
+    found: dict[str, dict[str, set[str]]] = {}
+    for who, installed in _installed(system):
+        for name, version in installed.items():
+            found.setdefault(_release(name), {}).setdefault(version, set()).add(who)
+    for name, by_version in sorted(found.items()):
+        if len(by_version) > 1:
+            listed = "; ".join(f"{version}: {', '.join(sorted(who))}" for version, who in sorted(by_version.items()))
+            ours = name == RELEASE
+            yield Finding("wrong" if ours else "note", f"versions of {name} differ: {listed}", SAME_VERSION if ours else "")
+
+
+def _installed(system: System) -> Iterator[tuple[str, Mapping[str, str]]]:
+    yield "this command", system.ours
+    for process in system.processes:
+        if process.health is not None:
+            yield f"{process.stage} on {process.health.host}", process.health.versions
+
+
+def _release(distribution: str) -> str:
+    return RELEASE if distribution.startswith("deixis-") else distribution
 
 
 def clocks(system: System) -> Iterator[Finding]:
-    """Hosts whose clocks differ from ours: ages are judged across hosts."""
+    """Hosts whose clocks differ from ours, and from each other as the stages see them."""
     told: set[str] = set()
     for process in system.processes:
-        ahead_s = process.clock_ahead_s
-        if process.health is None or ahead_s is None or abs(ahead_s) < CLOCK_S or process.health.host in told:
+        if process.health is None or process.clock is None or process.health.host in told:
             continue
-        told.add(process.health.host)
-        way = "ahead of" if ahead_s > 0 else "behind"
-        yield Finding(
-            "wrong", f"the clock of host {process.health.host} is {abs(ahead_s):.1f} s {way} ours", "run NTP or chrony on both"
-        )
+        said = say_skew(f"host {process.health.host}", process.clock, "ours")
+        if said:
+            told.add(process.health.host)
+            yield Finding("wrong", said, CLOCK_ADVICE)
+    for process in system.processes:
+        for item in process.health.clocks if process.health else []:
+            offset = Offset(round(item.ahead_s * 1e9), round(item.uncertain_s * 1e9))
+            said = say_skew(f"host {item.host} ({item.stage})", offset, f"that of host {_host(process)} ({process.stage})")
+            if said:
+                yield Finding("wrong", said, CLOCK_ADVICE)
+
+
+def _host(process: StageProcess) -> str:
+    return process.health.host if process.health is not None else "?"
+
+
+def _path(key: str) -> str:
+    return "/".join(key.split("/")[2:])
 
 
 def registry(state: State | None) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""`deixis doctor`: what is wrong with a running system, and what to do about it. Changes nothing."""
+"""`deixis doctor`: what is wrong with a running system and with this machine, and what to do about it. Changes nothing."""
 
 from __future__ import annotations
 
@@ -8,20 +8,27 @@ import time
 from typing import Any
 
 import zenoh
+from deixis_runtime.finding import Finding
 from deixis_runtime.session import Unreachable, open_client
 from deixis_schemas import topics
 from deixis_schemas.messages import Health, Poi
+from deixis_schemas.topics import By, Delivery
 from rich.console import Console
 from rich.text import Text
 
-from .checks import Finding, Listening, findings
+from .certificates import certificates_of
+from .checks import Listening, findings
+from .endpoint import why_unanswered
 from .gets import get_all
 from .inbox import Inbox
+from .local import examine_machine
 from .options import add_connect, add_json, add_robot
 from .system import look
 
 LISTEN_S = 2.5
 CPU_OVER_S = 0.3
+# Frames are left out: they would cross the link once more.
+LISTENED = tuple(topic for topic in topics.TOPICS if topic.by is By.FRAME and topic.delivery is not Delivery.BULK_NEWEST)
 MARKS = {"ok": ("ok   ", "green"), "note": ("note ", "yellow"), "wrong": ("WRONG", "red")}
 
 
@@ -31,12 +38,15 @@ def register(subparsers: Any) -> None:
     add_robot(parser)
     add_connect(parser)
     add_json(parser, "print one JSON document")
+    parser.add_argument("--source", metavar="SOURCE", help="also open this camera, file or stream here, and take a picture")
+    parser.add_argument("--local", action="store_true", help="look at this machine only, at no router")
     parser.set_defaults(run=run)
 
 
 def run(given: argparse.Namespace) -> int:
-    """Examine the system. 1 when something is wrong."""
-    found = examine(given.connect, given.robot)
+    """Examine the system and this machine. 1 when something is wrong."""
+    found = [] if given.local else examine(given.connect, given.robot)
+    found += examine_machine(given.source)
     wrong = [finding for finding in found if finding.level == "wrong"]
     if given.json:
         print(json.dumps({"robot": given.robot, "wrong": len(wrong), "findings": [vars(finding) for finding in found]}))
@@ -46,17 +56,18 @@ def run(given: argparse.Namespace) -> int:
 
 
 def examine(endpoint: str, robot: str) -> list[Finding]:
-    """All findings, the router's first."""
+    """Findings about the router and the robot's system behind it, the router's first."""
     try:
         with open_client(endpoint, shared_memory=False) as session:
             return [Finding("ok", f"the router at {endpoint} answers"), *_examine(session, robot)]
-    except Unreachable as error:
-        return [Finding("wrong", str(error), "check the endpoint, the network and that host's 'deixis up --listen'")]
+    except Unreachable:
+        return [why_unanswered(endpoint, certificates_of())]
 
 
 def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
     inbox = Inbox()
-    subscriber = session.declare_subscriber(topics.HEALTH.key(robot, stage="*"), inbox.store)
+    listened = (topics.HEALTH.key(robot, stage="*"), *(topic.key(robot) for topic in LISTENED))
+    subscribers = [session.declare_subscriber(key, inbox.store) for key in listened]
     began_s = time.monotonic()
     system = look(session, robot, CPU_OVER_S)
     if not system.processes:
@@ -65,9 +76,13 @@ def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
     fusion = any(process.stage == topics.POI.stage and process.health is not None for process in system.processes)
     reach = edits_reach_fusion(session, robot) if fusion else None
     time.sleep(max(0.0, LISTEN_S - (time.monotonic() - began_s)))
-    subscriber.undeclare()  # type: ignore[no-untyped-call]
-    heard = frozenset(item.message.stage for item in inbox.take_all() if isinstance(item.message, Health))
-    return findings(system, Listening(heard, reach))
+    for subscriber in subscribers:
+        subscriber.undeclare()  # type: ignore[no-untyped-call]
+    received = inbox.take_all()
+    healths = frozenset(item.message.stage for item in received if isinstance(item.message, Health))
+    # What came and breaks the contract did come: it is no silence.
+    heard = {item.key for item in received} | inbox.rejections.keys()
+    return findings(system, Listening(healths, reach, {topic.path: topic.key(robot) in heard for topic in LISTENED}))
 
 
 def edits_reach_fusion(session: zenoh.Session, robot: str) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
 import zenoh
+from deixis_runtime.clock_offset import Exchange
 from deixis_runtime.delivery import GET_PRIORITY
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health, Message, Poi, State
@@ -25,6 +28,14 @@ class Refusal:
     reason: str
 
 
+@dataclass(frozen=True)
+class TimedHealth:
+    """A health record, and when it was asked for and came: its stamp is the other host's clock in between."""
+
+    health: Health
+    exchange: Exchange
+
+
 def get_all(
     session: zenoh.Session,
     selector: str,
@@ -35,28 +46,14 @@ def get_all(
     timeout_s: float = TIMEOUT_S,
 ) -> tuple[list[tuple[str, T]], list[Refusal]]:
     """All replies to a get: the messages with their keys, and the refusals. Silence is neither."""
-    replies = session.get(
-        selector,
-        payload=payload,
-        encoding=encoding,
-        timeout=timeout_s,
-        priority=GET_PRIORITY,
-        target=zenoh.QueryTarget.ALL,
-        consolidation=zenoh.ConsolidationMode.NONE,
-    )
     good: list[tuple[str, T]] = []
     bad: list[Refusal] = []
-    for reply in replies:
-        if reply.ok is None:
-            error = reply.err.payload.to_bytes() if reply.err else b""
-            if error != TIMED_OUT:
-                bad.append(Refusal(selector, error.decode("utf-8", "replace")))
-            continue
-        key = str(reply.ok.key_expr)
-        try:
-            good.append((key, _read(type_, key, reply.ok)))
-        except codec.CodecError as error:
-            bad.append(Refusal(key, str(error)))
+    for reply in _replies(session, selector, payload=payload, encoding=encoding, timeout_s=timeout_s):
+        taken = _taken(reply, selector, type_)
+        if isinstance(taken, Refusal):
+            bad.append(taken)
+        elif taken is not None:
+            good.append(taken)
     return good, bad
 
 
@@ -84,8 +81,55 @@ def get_names(session: zenoh.Session, robot: str) -> dict[str, str]:
 
 def get_healths(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) -> list[Health]:
     """The health records of all stages that answer, by stage and instance."""
-    healths, _ = get_all(session, topics.HEALTH.key(robot, stage="*"), Health, timeout_s=timeout_s)
-    return sorted((health for _, health in healths), key=lambda health: (health.stage, health.instance))
+    found, _ = get_timed_healths(session, robot, timeout_s)
+    return [timed.health for _, timed in sorted(found.items())]
+
+
+def get_timed_healths(
+    session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S
+) -> tuple[dict[tuple[str, str], TimedHealth], list[Refusal]]:
+    """The health records of all that answer, by (stage, instance), each with the times of asking and answer; and refusals."""
+    asked_ns = time.monotonic_ns()
+    key = topics.HEALTH.key(robot, stage="*")
+    good: dict[tuple[str, str], TimedHealth] = {}
+    bad: list[Refusal] = []
+    for reply in _replies(session, key, timeout_s=timeout_s):
+        returned_ns = time.monotonic_ns()
+        health = _taken(reply, key, Health)
+        if isinstance(health, Refusal):
+            bad.append(health)
+        elif health is not None:
+            message = health[1]
+            between = Exchange(asked_ns, message.stamp_ns, returned_ns)
+            good[message.stage, message.instance] = TimedHealth(message, between)
+    return good, bad
+
+
+def _replies(
+    session: zenoh.Session, selector: str, *, payload: bytes | None = None, encoding: str | None = None, timeout_s: float
+) -> Iterator[zenoh.Reply]:
+    """Replies as they come, until all who were asked have answered or the time is over."""
+    yield from session.get(
+        selector,
+        payload=payload,
+        encoding=encoding,
+        timeout=timeout_s,
+        priority=GET_PRIORITY,
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+    )
+
+
+def _taken(reply: zenoh.Reply, selector: str, type_: type[T]) -> tuple[str, T] | Refusal | None:
+    """The message of a reply with its key, or why there is none; None for silence."""
+    if reply.ok is None:
+        error = reply.err.payload.to_bytes() if reply.err else b""
+        return None if error == TIMED_OUT else Refusal(selector, error.decode("utf-8", "replace"))
+    key = str(reply.ok.key_expr)
+    try:
+        return key, _read(type_, key, reply.ok)
+    except codec.CodecError as error:
+        return Refusal(key, str(error))
 
 
 def _read(type_: type[T], key: str, sample: zenoh.Sample) -> T:

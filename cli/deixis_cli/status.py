@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from deixis_runtime.session import open_client
-from deixis_schemas.messages import Health
+from deixis_schemas.messages import ClockHealth, Health
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -93,6 +93,7 @@ def remarks(system: System) -> list[str]:
         if process.health.state != "ok":
             lines.append(f"{process.stage}: {process.health.state}: {process.health.reason}")
         lines += [f"{process.stage}: {note}" for note in process.health.notes]
+        lines += [_clock(process.health, clock) for clock in process.health.clocks]
         lines += [f"{process.stage}: refused {item.key}: {item.last_error}" for item in process.health.inputs if item.rejected]
     if system.camera is not None:
         camera = system.camera
@@ -100,6 +101,15 @@ def remarks(system: System) -> list[str]:
     if system.state is not None:
         lines.append(f"fusion: {system.state.pois_total} POIs, {len(system.state.persons)} persons")
     return lines + system.doubled()
+
+
+def _clock(health: Health, clock: ClockHealth) -> str:
+    """How another host's clock stands beside that of this stage's host."""
+    way = "ahead of" if clock.ahead_s > 0 else "behind"
+    whose = f"the clock of host {clock.host} ({clock.stage})"
+    return (
+        f"{whose} is {abs(clock.ahead_s):.4f} s {way} that of host {health.host} ({health.stage}), +- {clock.uncertain_s:.4f} s"
+    )
 
 
 def _row(process: StageProcess, standing: Standing) -> list[Text]:

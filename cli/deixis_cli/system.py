@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import zenoh
+from deixis_runtime.clock_offset import Exchange, Offset, estimate
+from deixis_runtime.versions import versions_of
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, State
 
-from .gets import get_all, get_healths, get_state
+from .gets import Refusal, TimedHealth, get_all, get_state, get_timed_healths
 
 TOKENS_TIMEOUT_S = 2.0
 
@@ -20,14 +23,17 @@ HEARD_ONLY = "its messages are heard, but it answers no get of its health"
 
 @dataclass(frozen=True)
 class StageProcess:
-    """One process of a stage. alive: its liveliness token stands. cpu_percent: over the time looked at, none if unknown."""
+    """One process of a stage. alive: its liveliness token stands. cpu_percent: over the time looked at, none if unknown.
+
+    clock: how far the clock of its host is ahead of ours.
+    """
 
     stage: str
     instance: str
     alive: bool
     health: Health | None
     cpu_percent: float | None = None
-    clock_ahead_s: float | None = None
+    clock: Offset | None = None
 
     @property
     def name(self) -> str:
@@ -37,12 +43,14 @@ class StageProcess:
 
 @dataclass(frozen=True)
 class System:
-    """All that is known of one robot's system."""
+    """All that is known of one robot's system. refused: healths we cannot read; ours: versions that the asker runs."""
 
     robot: str
     processes: list[StageProcess] = field(default_factory=list)
     camera: CameraInfo | None = None
     state: State | None = None
+    refused: list[Refusal] = field(default_factory=list)
+    ours: Mapping[str, str] = field(default_factory=dict)
 
     def heard(self) -> set[str]:
         """`stage/instance` of all whose messages the stages have heard lately."""
@@ -75,24 +83,24 @@ class System:
 def look(session: zenoh.Session, robot: str, cpu_over_s: float = 0.0) -> System:
     """Ask a system how it is; with `cpu_over_s` twice, that far apart, to see the processor time used in between."""
     tokens = alive_processes(session, robot)
-    before = {(item.stage, item.instance): item for item in get_healths(session, robot)} if cpu_over_s else {}
-    if before:
+    before: dict[tuple[str, str], TimedHealth] = {}
+    if cpu_over_s:
+        before, _ = get_timed_healths(session, robot)
         time.sleep(cpu_over_s)
-    asked_ns = time.time_ns()
-    healths = {(item.stage, item.instance): item for item in get_healths(session, robot)}
-    elapsed_s = (time.time_ns() - asked_ns) / 1e9
+    after, refused = get_timed_healths(session, robot)
     processes = [
         StageProcess(
             *who,
             alive=who in tokens,
-            health=healths.get(who),
-            cpu_percent=_cpu_percent(before.get(who), healths.get(who)),
-            clock_ahead_s=_clock_ahead_s(healths.get(who), asked_ns, elapsed_s),
+            health=after[who].health if who in after else None,
+            cpu_percent=_cpu_percent(before[who].health, after[who].health) if who in before and who in after else None,
+            clock=_beside_ours([found[who].exchange for found in (before, after) if who in found]),
         )
-        for who in sorted(tokens | set(healths), key=_in_order)
+        for who in sorted(tokens | set(after), key=_in_order)
     ]
     cameras, _ = get_all(session, topics.CAMERA_INFO.key(robot), CameraInfo)
-    return System(robot, processes, cameras[0][1] if cameras else None, get_state(session, robot))
+    state = get_state(session, robot)
+    return System(robot, processes, cameras[0][1] if cameras else None, state, refused, versions_of("cli"))
 
 
 def alive_processes(session: zenoh.Session, robot: str) -> set[tuple[str, str]]:
@@ -107,15 +115,13 @@ def _in_order(who: tuple[str, str]) -> tuple[int, str, str]:
     return topics.STAGES.index(stage) if stage in topics.STAGES else len(topics.STAGES), stage, instance
 
 
-def _cpu_percent(before: Health | None, after: Health | None) -> float | None:
-    if before is None or after is None or after.uptime_s <= before.uptime_s:
+def _cpu_percent(before: Health, after: Health) -> float | None:
+    if after.uptime_s <= before.uptime_s:
         return None
     return 100 * (after.cpu_s - before.cpu_s) / (after.uptime_s - before.uptime_s)
 
 
-def _clock_ahead_s(health: Health | None, asked_ns: int, elapsed_s: float) -> float | None:
-    """How far the clock of the stage's host is ahead of ours, as far as the answer's delay lets us tell: else 0."""
-    if health is None:
-        return None
-    ahead_s = (health.stamp_ns - asked_ns) / 1e9
-    return min(ahead_s, 0.0) if ahead_s < elapsed_s else ahead_s - elapsed_s
+def _beside_ours(exchanges: list[Exchange]) -> Offset | None:
+    """How far a clock is ahead of our wall clock now, by questions to it."""
+    known = estimate(exchanges)
+    return None if known is None else known.beside(time.time_ns() - time.monotonic_ns())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections import deque
@@ -13,7 +14,6 @@ from deixis_schemas.messages import ClockHealth, Health
 from .clock_offset import ClockOffset, Exchange, Offset
 from .delivery import GET_PRIORITY
 
-PERIOD_S = 2.0
 TIMEOUT_S = 1.9
 MAX_WAITING = 8
 # Stamps of two hosts are set beside each other by people and by robot poses: what differs by more is worth a word.
@@ -32,14 +32,11 @@ class ClockWatch:
         self._instance = ""
         self._lock = threading.Lock()
         self._answers: deque[tuple[int, int, bytes, str]] = deque(maxlen=MAX_WAITING)
-        self._due_s = 0.0
 
     def turn(self) -> None:
-        """Take in what was answered, and ask again where that is due."""
+        """Take in what was answered, and ask again. Called with each heartbeat, once a second."""
         self._take_answers()
-        if time.monotonic() >= self._due_s:
-            self._due_s = time.monotonic() + PERIOD_S
-            self._ask()
+        self._ask()
 
     def offset(self) -> Offset | None:
         """How far the stage's clock is ahead of our wall clock now. None where that is not known, or not any more."""
@@ -62,7 +59,11 @@ class ClockWatch:
     def complaint(self) -> str | None:
         """What is to be said of the clock; None where it is near enough to ours."""
         offset = self.offset()
-        return None if offset is None else say_skew(f"host '{self.host}' ({self.stage})", offset, "this host's")
+        return (
+            None
+            if offset is None
+            else say_skew(f"host {self.host} ({self.stage})", offset, f"that of host {socket.gethostname()}")
+        )
 
     def _ask(self) -> None:
         asked_ns = time.monotonic_ns()

@@ -489,7 +489,7 @@ class Target(OfFrame):
         default=None,
         ge=0,
         description="By how much latency_ms may be wrong because the clocks of two hosts go into it. None where they were not "
-        "compared: then it is their plain difference, and means nothing where they differ. 0 in lockstep.",
+        "compared, or one was set since: then it is their plain difference, and means nothing. 0 in lockstep.",
     )
 
 

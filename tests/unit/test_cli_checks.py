@@ -2,9 +2,11 @@
 
 import pytest
 from deixis_cli.checks import Listening, findings
+from deixis_cli.gets import Refusal
 from deixis_cli.system import StageProcess, System
+from deixis_runtime.clock_offset import Offset
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Health, InputHealth, OutputHealth, State
+from deixis_schemas.messages import CameraInfo, ClockHealth, Health, InputHealth, OutputHealth, State
 
 CLEAN = Listening(frozenset(topics.STAGES), edits_reach_fusion=True)
 
@@ -20,7 +22,8 @@ def health(stage, **changes):
 
 
 def process(stage, instance="a", alive=True, clock_ahead_s=0.0, **changes):
-    return StageProcess(stage, instance, alive, health(stage, **changes), 10.0, clock_ahead_s)
+    clock = Offset(round(clock_ahead_s * 1e9), 2_000_000)
+    return StageProcess(stage, instance, alive, health(stage, **changes), 10.0, clock)
 
 
 def camera(**changes):
@@ -73,7 +76,7 @@ def test_inputs_that_are_silent_or_refused_are_named():
     ]
     said = wrong(system(processes={"headpose": [process("headpose", inputs=inputs)]}))
     assert said == [
-        "headpose has heard no camera/frame for 9 s",
+        "headpose has heard no camera/frame for 9 s, but camera says that it published 300 of them, 30/s now",
         "headpose refused 3 of tracker/tracks: Tracks version '2'",
     ]
 
@@ -124,3 +127,76 @@ def test_a_slow_stage_is_blamed_and_not_those_behind_it():
 
     slow = {"tracker": at("tracker", 9, camera_frame=30), "gesture": at("gesture", 9, tracker_tracks=9.5)}
     assert wrong(system(processes=slow)) == ["tracker/tracks: 9.0/s, expected 30/s"]
+
+
+def found(system, start, listening=CLEAN):
+    """The findings that begin so."""
+    return [finding for finding in findings(system, listening) if finding.what.startswith(start)]
+
+
+def test_a_key_that_the_link_keeps_is_named_with_both_its_ends():
+    silent = [InputHealth(key="deixis/r1/camera/frame")]
+    processes = {"camera": [process("camera", host="robot")], "tracker": [process("tracker", inputs=silent)]}
+    (kept,) = found(system(processes=processes), "tracker has heard no camera/frame ever")
+    assert "camera says that it published 300 of them, 30/s now" in kept.what
+    assert kept.advice.startswith("the link from robot to edge or its access control keeps camera/frame")
+
+
+def test_frames_that_all_come_too_late_are_not_called_denied():
+    late = [InputHealth(key="deixis/r1/camera/frame", received=90, too_old=90, rate_hz=12)]
+    (said,) = found(system(processes={"tracker": [process("tracker", inputs=late)]}), "tracker has heard no camera/frame")
+    assert "young enough" in said.what
+    assert "link is too slow" in said.advice
+
+
+def test_topics_that_are_kept_from_us_are_named_and_only_what_tools_need_is_wrong():
+    listening = Listening(CLEAN.healths, True, {"tracker/tracks": False, "headpose/poses": True, "fusion/belief": False})
+    said = {finding.what: finding.level for finding in findings(system(), listening) if "we hear none" in finding.what}
+    assert said == {
+        "tracker/tracks: tracker publishes 30/s of it, and we hear none": "note",
+        "fusion/belief: fusion publishes 30/s of it, and we hear none": "wrong",
+    }
+
+
+def test_what_nobody_publishes_is_not_called_kept_from_us():
+    listening = Listening(CLEAN.healths, True, {"fusion/belief": False})
+    assert wrong(system(processes={"fusion": [process("fusion", outputs=[], uptime_s=1)]}), listening) == []
+
+
+def test_two_versions_of_a_message_are_called_that():
+    heard = [
+        InputHealth(key="deixis/r1/camera/frame", rejected=3, last_error="Frame version '1', this reader speaks 2", age_s=0.1)
+    ]
+    (said,) = found(system(processes={"tracker": [process("tracker", inputs=heard)]}), "tracker refused 3 of camera/frame")
+    assert said.advice.startswith("two versions of the contract meet: install the same version")
+    heard = [InputHealth(key="deixis/r1/camera/frame", rejected=3, last_error="data: 3 bytes, but ...", age_s=0.1)]
+    (said,) = found(system(processes={"tracker": [process("tracker", inputs=heard)]}), "tracker refused 3 of camera/frame")
+    assert "breaks the contract" in said.advice
+
+
+def test_hosts_with_different_releases_are_named():
+    old = process("camera", host="robot", versions={"deixis-schemas": "0.1.0", "eclipse-zenoh": "1.9.0"})
+    new = process("tracker", versions={"deixis-schemas": "0.2.0", "eclipse-zenoh": "1.10.2"})
+    ours = {"deixis-schemas": "0.2.0", "eclipse-zenoh": "1.10.2"}
+    seen = system(processes={"camera": [old], "tracker": [new]}, ours=ours)
+    assert wrong(seen) == ["versions of Deixis differ: 0.1.0: camera on robot; 0.2.0: this command, tracker on edge"]
+    (zenoh,) = found(seen, "versions of eclipse-zenoh differ")
+    assert zenoh.level == "note"
+
+
+def test_a_health_that_cannot_be_read_is_named():
+    refused = [Refusal("deixis/r1/camera/health", "Health version '2', this reader speaks 1")]
+    said = wrong(system(refused=refused))
+    assert said == ["deixis/r1/camera/health: its health cannot be read: Health version '2', this reader speaks 1"]
+
+
+@pytest.mark.parametrize(("ahead_s", "way"), [(180.0, "3 min 0 s ahead of"), (-0.5, "0.5 s behind")])
+def test_clocks_of_two_hosts_are_named_as_the_stages_see_them(ahead_s, way):
+    clocks = [ClockHealth(stage="camera", host="robot", ahead_s=ahead_s, uncertain_s=0.002)]
+    said = wrong(system(processes={"fusion": [process("fusion", clocks=clocks)]}))
+    assert said == [f"the clock of host robot (camera) is {way} that of host edge (fusion)"]
+
+
+def test_a_difference_that_the_round_trip_may_explain_is_not_called_one():
+    clocks = [ClockHealth(stage="camera", host="robot", ahead_s=0.9, uncertain_s=0.8)]
+    assert wrong(system(processes={"fusion": [process("fusion", clocks=clocks)]})) == []

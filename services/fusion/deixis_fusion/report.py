@@ -22,6 +22,7 @@ from .visibility import Candidate
 
 # Members named in all sets of one source together: a Belief about many persons stays below the topic's limit.
 MAX_MEMBERS = 96
+LONGEST_LATENCY_NS = 10 * 10**9
 # Parts of a message, which is made and validated at once, with all that is in it: one by one takes three times as long.
 Content = dict[str, object]
 
@@ -117,7 +118,11 @@ class TargetReport:
     def _latency_uncertain_ms(self) -> float | None:
         if self.now_ns is None:
             return 0.0
-        return None if self.uncertain_ns is None else self.uncertain_ns / 1e6
+        if self.uncertain_ns is None:
+            return None
+        # A clock that was set since it was last compared shows by latencies that cannot be.
+        possible = -self.uncertain_ns <= self.now_ns - self.frame.stamp_ns <= LONGEST_LATENCY_NS
+        return self.uncertain_ns / 1e6 if possible else None
 
 
 # --- rows -------------------------------------------------------------------------------------------------------------
