@@ -1,0 +1,174 @@
+"""The units as docs/deployment.md installs them, run by systemd: robot and edge on one host."""
+
+import json
+import re
+import subprocess
+import time
+
+import pytest
+from running import CLIP, POINTED_AT, ROOT, SITE, wait_until
+from systemd_host import CHECKOUT, UNIT_PATH, SystemdHost, missing_for_systemd_host
+
+WHY_NOT = missing_for_systemd_host()
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
+
+STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
+UNITS = ("deixis-router.service", *(f"deixis@{stage}.service" for stage in STAGES))
+TARGETS = ("deixis-robot.target", "deixis-edge.target")
+SOCKET = "unixsock-stream//run/deixis/router.sock"
+PATIENCE_S = 60.0
+AGAIN_S = 5.0  # 2 s of silence and 0.2 s of a pause, and the rest for a busy machine
+ROBOT = "r1"
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory):
+    """Both targets started, on the example clip played again and again."""
+    with SystemdHost(tmp_path_factory.mktemp("systemd")) as made:
+        made.run(["sh", "-euc", f"cd /checkout\n{install_commands()}"])
+        settings = (ROOT / "systemd" / "deixis.env").read_text().replace("DEIXIS_ROBOT=\n", f"DEIXIS_ROBOT={ROBOT}\n")
+        assert f"DEIXIS_ROBOT={ROBOT}" in settings
+        # In lockstep, so that a busy machine plays the clip slowly and drops nothing.
+        (made.share / "deixis.env").write_text(settings.replace("/etc/deixis/site.yaml", f"{on_host(SITE)} --lockstep"))
+        (made.share / "camera.env").write_text(f'DEIXIS_STAGE_OPTIONS="--set source={on_host(CLIP)} --set loop=true"\n')
+        made.run(["cp", "/share/deixis.env", "/share/camera.env", "/etc/deixis/"])
+        made.run(["systemctl", "start", *TARGETS])
+        yield made
+
+
+def install_commands():
+    """The block of the page that installs the units, word for word."""
+    page = (ROOT / "docs" / "deployment.md").read_text()
+    (block,) = [block for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL) if "systemd-sysusers" in block]
+    return block
+
+
+def on_host(path):
+    """Where the host has a file of the checkout."""
+    return f"{CHECKOUT}/{path.relative_to(ROOT)}"
+
+
+def deixis(host, *arguments, check=True):
+    return host.run(["deixis", *arguments, "--robot", ROBOT, "--connect", SOCKET], check=check)
+
+
+def names_the_poi(host):
+    answer = deixis(host, "watch", "--until-answer", "--expect", POINTED_AT, "--seconds", "30", check=False)
+    return answer.returncode == 0 and f"({POINTED_AT})" in answer.stdout
+
+
+def send(host, signal, unit):
+    """Send a signal to the unit's own process."""
+    host.run(["systemctl", "kill", "--kill-whom=main", f"--signal={signal}", unit])
+
+
+def main_pid(host, unit):
+    """Process number, as the host counts them; 0 while the unit does not run."""
+    ready = host.show(unit, "SubState") == "running"
+    return int(host.show(unit, "MainPID")) if ready else 0
+
+
+def restarts(host, unit):
+    return int(host.show(unit, "NRestarts"))
+
+
+def shared_segments(host, unit):
+    """Shared memory that the unit's process has mapped."""
+    maps = host.run(["cat", f"/proc/{main_pid(host, unit)}/maps"]).stdout
+    return set(re.findall(r"/dev/shm/\S+", maps))
+
+
+def test_systemd_finds_no_fault_in_the_units(host):
+    files = [f"/etc/systemd/system/{name}" for name in ("deixis-router.service", *TARGETS)]  # and with the targets all stages
+    done = host.run(["env", f"SYSTEMD_UNIT_PATH={UNIT_PATH}", "systemd-analyze", "verify", "--man=no", *files], check=False)
+    ours = [line for line in (done.stdout + done.stderr).splitlines() if "deixis" in line]
+    assert ours == []
+
+
+def test_the_poi_is_named(host):
+    wait_until(lambda: names_the_poi(host), f"{POINTED_AT} is named", PATIENCE_S, host.log)
+    assert {host.show(unit, "ActiveState") for unit in UNITS} == {"active"}
+    assert "/var/lib/deixis/r1/pointing-" in host.run(["sh", "-c", "ls /var/lib/deixis/r1/*.sqlite"]).stdout
+
+
+def test_the_units_run_without_privileges_network_or_a_root_to_write_to(host):
+    own = host.run(["readlink", "/proc/1/ns/net"]).stdout
+    for unit in UNITS:
+        pid = main_pid(host, unit)
+        status = dict(line.split(":\t", 1) for line in host.run(["cat", f"/proc/{pid}/status"]).stdout.splitlines())
+        assert status["Uid"].split()[0] != "0"
+        assert status["NoNewPrivs"] == "1"
+        assert int(status["CapBnd"], 16) == 0
+        assert int(status["Seccomp"]) == 2
+        assert (host.run(["readlink", f"/proc/{pid}/ns/net"]).stdout == own) is (unit == "deixis-router.service"), unit
+        inside = ["nsenter", "-t", pid, "-m", "-S", status["Uid"].split()[0], "--"]
+        refused = host.run([*inside, "touch", "/var/lib/x", "/etc/x"], check=False)
+        assert refused.stderr.count("Read-only file system") == 2, unit
+
+
+def test_memory_is_limited(host):
+    limits = {unit: int(host.show(unit, "MemoryMax")) // 2**20 for unit in UNITS}
+    assert limits == {unit: 256 if unit == "deixis-router.service" else 512 for unit in UNITS}
+
+
+def test_a_killed_stage_and_a_stopped_one_are_started_again_and_the_poi_is_named_again(host):
+    tracker, headpose = "deixis@tracker.service", "deixis@headpose.service"
+    before = {unit: (main_pid(host, unit), restarts(host, unit)) for unit in UNITS}
+    at_s = time.monotonic()
+    send(host, "KILL", tracker)
+    send(host, "STOP", headpose)
+    for unit in (tracker, headpose):
+        old = before[unit][0]
+        wait_until(lambda unit=unit, old=old: main_pid(host, unit) not in (0, old), f"{unit} is again", PATIENCE_S, host.log)
+        assert started_s(host, unit) - at_s < AGAIN_S, unit
+    assert {unit for unit in UNITS if restarts(host, unit) > before[unit][1]} == {tracker, headpose}
+    wait_for_an_answer(host)
+
+
+def started_s(host, unit):
+    """When the unit's process was started, on the monotonic clock that all namespaces share."""
+    return int(host.show(unit, "ExecMainStartTimestampMonotonic")) / 1e6
+
+
+def wait_for_an_answer(host):
+    """Wait for a final answer that comes from now on, and is right."""
+    argv = ["deixis", "watch", "--json", "--robot", ROBOT, "--connect", SOCKET, "--seconds", PATIENCE_S]
+    with host.popen(argv, stdout=subprocess.PIPE, text=True) as watch:
+        try:
+            assert any(is_right(json.loads(line)) for line in watch.stdout), host.log.read_text()[-3000:]
+        finally:
+            watch.terminate()
+
+
+def is_right(line):
+    return line["type"] == "Target" and line["message"]["final"] and line["message"]["poi_ids"] == [POINTED_AT]
+
+
+def test_live_stages_share_memory(host):
+    host.run(["sed", "-i", "s/ --lockstep//", "/etc/deixis/deixis.env"])
+    host.run(["systemctl", "restart", *UNITS[1:]])
+    tracker, headpose = "deixis@tracker.service", "deixis@headpose.service"
+    common = wait_until(
+        lambda: shared_segments(host, tracker) & shared_segments(host, headpose), "frames", PATIENCE_S, host.log
+    )
+    assert common, "frames of the camera, mapped by both"
+
+
+def test_wrong_settings_are_not_tried_again_and_the_reason_is_on_display(host):
+    host.run(["sh", "-c", "echo 'DEIXIS_STAGE_OPTIONS=\"--set sauce=0\"' >/etc/deixis/camera.env"])
+    host.run(["systemctl", "restart", "deixis@camera.service"], check=False)
+    wait_until(lambda: host.show("deixis@camera.service", "ActiveState") == "failed", "given up", PATIENCE_S, host.log)
+    assert host.show("deixis@camera.service", "ExecMainStatus") == "78"
+    assert "sauce" in host.log.read_text()
+    host.run(["cp", "/share/camera.env", "/etc/deixis/"])
+    host.run(["systemctl", "start", "deixis@camera.service"])
+
+
+def test_stopping_leaves_nothing(host):
+    host.run(["systemctl", "stop", *TARGETS])
+    # The command waits for the targets only; what they hold stops meanwhile.
+    wait_until(lambda: {host.show(unit, "ActiveState") for unit in UNITS} == {"inactive"}, "all stop", 15, host.log)
+    assert {host.show(unit, "Result") for unit in UNITS} == {"success"}
+    assert host.commands() == []
+    assert host.run(["ls", "-A", "/run/deixis"], check=False).returncode != 0, "the router's folder is gone"
+    assert host.run(["find", "/dev/shm", "/tmp", "/var/tmp", "-type", "f"], check=False).stdout == ""
