@@ -2,6 +2,7 @@
 
 import threading
 import time
+import weakref
 from types import SimpleNamespace
 
 import pytest
@@ -267,6 +268,23 @@ def test_in_lockstep_no_age_is_judged(log, clock):
         deliver(seq, 0.0)
         clock.now_s += 60.0
     assert len(frames.take_all()) == 3
+
+
+def test_what_is_larger_than_its_topic_allows_is_refused_and_not_kept(log):
+    tracks = Subscription(topics.TRACKS, topics.TRACKS.key("r1"), 8, no_wake, log)
+
+    class Large(SimpleNamespace):
+        """Can be watched for being kept."""
+
+    kept = Large(key_expr=tracks.key, payload=ZBytes(bytes(topics.TRACKS.max_bytes + 1)))
+    still_there = weakref.ref(kept)
+    tracks.store(kept)
+    del kept
+    assert still_there() is None
+    assert tracks.take_all() == []
+    assert (tracks.received, tracks.rejected) == (1, 1)
+    assert tracks.health().last_error == "1048577 bytes, more than the 1048576 allowed"
+    assert log.said == ["deixis/r1/tracker/tracks: rejected: 1048577 bytes, more than the 1048576 allowed"]
 
 
 def test_step_times_are_those_of_the_last_second():
