@@ -27,6 +27,7 @@ from .manager import Manager
 from .memory import settle
 from .outputs import Publisher, oversize
 from .queries import Answer, EditQueue, Query, QueryQueue
+from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
 
@@ -131,6 +132,10 @@ class Node:
         self._clocks.append(watch)
         return watch
 
+    def follow_readers(self, topic: Topic) -> Readers:
+        """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
+        return Readers(self._session, self.robot, topic, self._alive, self._router)
+
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
         return self._alive.stages()
@@ -221,7 +226,7 @@ class Node:
         if self._parent is not None and os.getppid() != self._parent:
             self.log.error("the supervisor is gone; stopping")
             self.stop()
-        if not self._session.info.routers_zid():
+        if not self._router():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
 
     def _tell_manager(self) -> None:
@@ -237,7 +242,11 @@ class Node:
 
     def _record(self) -> Health:
         clocks = [known for watch in self._clocks if (known := watch.health()) is not None]
-        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks)
+        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks, self._router())
+
+    def _router(self) -> str:
+        """Zenoh id of the router we are a client of; empty without one."""
+        return next(map(str, self._session.info.routers_zid()), "")
 
     def _declare_alive(self) -> None:
         settle()
