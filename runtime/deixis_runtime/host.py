@@ -42,7 +42,7 @@ class HostFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class HostOptions:
-    """What runs on a host and where it is reached."""
+    """What runs on a host and where it is reached. fork: its processes are forked from one that has done their imports."""
 
     robot: str
     stages: tuple[str, ...]
@@ -53,6 +53,7 @@ class HostOptions:
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
+    fork: bool = True
 
 
 def installed_stages() -> set[str]:
@@ -118,7 +119,7 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
-        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables())).start
+        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:
