@@ -18,6 +18,7 @@ import zenoh
 from .interrupts import Interrupts
 from .limit import RateLimit
 from .manager import Manager
+from .memory import settle
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
 
@@ -87,6 +88,7 @@ def _watch_links(
 ) -> None:
     linked: bool | None = None
     manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    settle()
     _tell_manager(manager, limit, "routing")
     while not interrupts.wait(CHECK_S):
         if parent is not None and os.getppid() != parent:

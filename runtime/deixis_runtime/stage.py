@@ -24,6 +24,7 @@ from .inputs import Subscription
 from .limit import RateLimit
 from .liveliness import AliveStages
 from .manager import Manager
+from .memory import settle
 from .outputs import Publisher, oversize
 from .queries import Answer, EditQueue, Query, QueryQueue
 from .readers import Readers
@@ -251,6 +252,7 @@ class Node:
         return next(map(str, self._session.info.routers_zid()), "")
 
     def _declare_alive(self) -> None:
+        settle()
         # Only now, when all subscribers stand: whoever waits for the token may publish at once.
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
