@@ -107,6 +107,10 @@ class Bench:
         """End it by SIGKILL."""
         assert self.stop(signal.SIGKILL) == -signal.SIGKILL
 
+    def key(self, path: str) -> str:
+        """A key of this robot."""
+        return f"deixis/{self.robot}/{path}"
+
     def replies(self, path: str, payload: bytes | None = None, encoding: str | None = None) -> list[zenoh.Reply]:
         selector = f"deixis/{self.robot}/{path}"
         return list(self.session.get(selector, payload=payload, encoding=encoding, timeout=5.0))
@@ -171,13 +175,20 @@ def face() -> Track:
     )
 
 
-def show(bench: Bench, seq: int, *, head: bool = True) -> None:
-    """One frame of a person who points left and looks there, 2 m ahead."""
-    now_ns = time.time_ns()
-    bench.put(topics.TRACKS, Tracks(**of_frame("tracker", seq, now_ns), width=640, height=480, tracks=[face()]))
+def messages_of(seq: int, now_ns: int) -> list[tuple[topics.Topic, Message]]:
+    """What the stages say of one frame of a person who points left and looks there, 2 m ahead."""
     pose = {"person_id": 1, "status": "tracking", "yaw_deg": 60.0, "yaw_sigma_deg": 3.0}
-    if head:
-        bench.put(topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq, now_ns) | {"poses": [pose]}))
     hand = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 10.0}
-    bench.put(topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq, now_ns) | {"gestures": [hand]}))
+    return [
+        (topics.TRACKS, Tracks(**of_frame("tracker", seq, now_ns), width=640, height=480, tracks=[face()])),
+        (topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq, now_ns) | {"poses": [pose]})),
+        (topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq, now_ns) | {"gestures": [hand]})),
+    ]
+
+
+def show(bench: Bench, seq: int, *, head: bool = True) -> None:
+    """One frame of that person, until its belief is there."""
+    for topic, message in messages_of(seq, time.time_ns()):
+        if head or topic is not topics.HEAD_POSES:
+            bench.put(topic, message)
     wait_until(lambda: bench.beliefs and bench.beliefs[-1].seq == seq, f"the belief of frame {seq}")

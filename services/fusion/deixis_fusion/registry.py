@@ -66,6 +66,7 @@ class Registry:
         """Open the file, or make it with its folder; without a path, in memory. Raises RegistryError where that fails."""
         self.path = path or MEMORY
         self._pois: dict[str, Poi] = {}
+        self._listed: list[Poi] = []
         self._copied = False
         try:
             if path is not None:
@@ -86,7 +87,10 @@ class Registry:
 
     def pois(self) -> list[Poi]:
         """All POIs, by id."""
-        return [self._pois[poi_id] for poi_id in sorted(self._pois)]
+        # Listed once and not for each get: thousands take milliseconds.
+        if not self._listed:
+            self._listed = [self._pois[poi_id] for poi_id in sorted(self._pois)]
+        return list(self._listed)
 
     def get(self, poi_id: str) -> Poi | None:
         """The POI of that id."""
@@ -118,6 +122,7 @@ class Registry:
                 raise
             return [error] * len(results)
         self._pois = after
+        self._listed = []
         return results
 
     def put(self, poi: Poi) -> None:
@@ -154,6 +159,7 @@ class Registry:
         self._pois.update(stored)
         for poi_id in gone:
             self._pois.pop(poi_id, None)
+        self._listed = []
         return sorted(changed + gone)
 
     def keep_copy(self) -> None:
