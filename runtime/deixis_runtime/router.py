@@ -20,9 +20,11 @@ from .limit import RateLimit
 from .manager import Manager
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
+from .two_links import two_links
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
+OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
 SOCKET_FOLDER_PREFIX = "deixis-"
 
@@ -32,12 +34,16 @@ log = logging.getLogger("deixis-router")
 def router_config(listen: list[str], connect: list[str], file: Path | None = None) -> zenoh.Config:
     """Configuration of a host's router. Peers that are not there yet are tried again and again."""
     config = base_config("router", file)
+    connect = [link for endpoint in connect for link in two_links(endpoint)]
     settings = {
+        "transport/unicast/max_links": 2,
         "transport/link/tx/lease": LEASE_MS,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2},
+        # A link that is back is to be found at once. TCP asks ever more seldom, so a connection that does not come is begun anew.
+        "connect/retry": {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2},
+        "transport/unicast/open_timeout": OPEN_TIMEOUT_MS,
     }
     if file is None:
         put_settings(config, settings)

@@ -65,6 +65,7 @@ class Node:
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
         self._clocks: list[ClockWatch] = []
+        self._clock_of_frames: ClockWatch | None = None  # for ages only; said by who is asked to follow it
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._token: Any = None
@@ -76,7 +77,10 @@ class Node:
     def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
         """Listen to a topic and keep its newest `depth` samples."""
         key = topic.key(self.robot)
-        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn, lockstep=self.lockstep)
+        clock = self._frames_clock() if topic is topics.FRAME else None
+        subscription: Subscription[Any] = Subscription(
+            topic, key, depth, self.wake, self.warn, lockstep=self.lockstep, clock=clock
+        )
         self._declared.append(self._session.declare_subscriber(key, subscription.store))
         self._inputs.append(subscription)
         return subscription
@@ -252,7 +256,14 @@ class Node:
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
+    def _frames_clock(self) -> ClockWatch | None:
+        if self._clock_of_frames is None and not self.lockstep:
+            self._clock_of_frames = ClockWatch(self._session, self.robot, topics.FRAME.stage)
+        return self._clock_of_frames
+
     def _look_at_clocks(self) -> None:
+        if self._clock_of_frames is not None:
+            self._clock_of_frames.turn()
         for watch in self._clocks:
             watch.turn()
             complaint = watch.complaint()

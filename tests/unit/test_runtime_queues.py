@@ -124,8 +124,8 @@ def test_gets_past_the_bound_are_counted(log):
     assert queue.lost == 2
 
 
-def frame_sample(seq, stamp_ns):
-    payload = codec.encode(FRAME.model_copy(update={"seq": seq, "stamp_ns": stamp_ns}))
+def frame_sample(seq, stamp_ns, run=FRAME.run):
+    payload = codec.encode(FRAME.model_copy(update={"run": run, "seq": seq, "stamp_ns": stamp_ns}))
     key = topics.FRAME.key("r1")
     return SimpleNamespace(
         key_expr=key, kind=SampleKind.PUT, payload=ZBytes(payload), encoding=codec.encoding_of(topics.FRAME.type)
