@@ -38,6 +38,8 @@ def router_config(listen: list[str], connect: list[str], file: Path | None = Non
     settings = {
         "transport/unicast/max_links": 2,
         "transport/link/tx/lease": LEASE_MS,
+        # It hands on what stages put into shared memory, and lays out 16 MB of its own for nothing.
+        "transport/shared_memory/transport_optimization/enabled": False,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,

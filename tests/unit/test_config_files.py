@@ -19,6 +19,7 @@ def test_our_router_takes_the_settings_and_the_endpoints_of_the_command_line(pat
     assert json.loads(config.get_json("mode")) == "router"
     assert json.loads(config.get_json("transport/link/tx/lease")) == 2000
     assert json.loads(config.get_json("scouting/multicast/enabled")) is False
+    assert json.loads(config.get_json("transport/shared_memory/transport_optimization/enabled")) is False
     assert json.loads(config.get_json("listen/endpoints")) == ["tcp/127.0.0.1:1"]
     assert json.loads(config.get_json("connect/endpoints")) == ["tcp/127.0.0.1:2"]
 

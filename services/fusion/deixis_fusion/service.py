@@ -87,6 +87,7 @@ class FusionService:
         try:
             self._registry.keep_copy()
         except RegistryError as error:
+            self._node.warn("registry copy", str(error))
             self._node.note("registry copy", str(error))
         else:
             self._node.note("registry copy", None)
