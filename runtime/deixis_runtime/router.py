@@ -34,7 +34,6 @@ log = logging.getLogger("deixis-router")
 def router_config(listen: list[str], connect: list[str], file: Path | None = None) -> zenoh.Config:
     """Configuration of a host's router. Peers that are not there yet are tried again and again."""
     config = base_config("router", file)
-    connect = [link for endpoint in connect for link in two_links(endpoint)]
     settings = {
         "transport/unicast/max_links": 2,
         "transport/link/tx/lease": LEASE_MS,
@@ -43,12 +42,14 @@ def router_config(listen: list[str], connect: list[str], file: Path | None = Non
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
-        # A link that is back is to be found at once. TCP asks ever more seldom, so a connection that does not come is begun anew.
+        # A link that is back is to be found at once. TCP asks ever more seldom: a connection that does not come is begun anew.
         "connect/retry": {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2},
         "transport/unicast/open_timeout": OPEN_TIMEOUT_MS,
     }
     if file is None:
         put_settings(config, settings)
+    if json.loads(config.get_json("transport/unicast/max_links")) > 1:
+        connect = [link for endpoint in connect for link in two_links(endpoint)]
     given = {side: json.loads(config.get_json(f"{side}/endpoints")) for side in ("listen", "connect")} if file else {}
     put_settings(config, {"listen/endpoints": listen + _endpoints(given.get("listen"))})
     put_settings(config, {"connect/endpoints": connect + _endpoints(given.get("connect"))})

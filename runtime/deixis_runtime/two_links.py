@@ -13,8 +13,7 @@ PROTOCOLS = ("tcp/", "tls/")
 def two_links(endpoint: str) -> list[str]:
     """The endpoints to connect to in place of this one; itself where it has priorities already, or its protocol no streams.
 
-    Both routers must allow two links (`transport/unicast/max_links`); where the other does not, one is refused and the other
-    carries its own priorities alone.
+    Both routers must allow two links (`transport/unicast/max_links`).
     """
     address, _, settings = endpoint.partition("#")
     base, _, metadata = address.partition("?")
