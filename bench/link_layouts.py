@@ -68,9 +68,10 @@ class Layout:
             if process.poll() is not None:
                 raise LinkBenchError(f"{self.name}: {name} ended with {process.returncode}: {self.log(name)}")
 
-    def log(self, name: str) -> str:
-        """The end of what a process said."""
-        return (self.folder / f"{name}.log").read_text(errors="replace")[-2000:]
+    def log(self, name: str, *, whole: bool = False) -> str:
+        """What a process said: the end of it, or all."""
+        text = (self.folder / f"{name}.log").read_text(errors="replace")
+        return text if whole else text[-2000:]
 
     def _start_routers(self) -> None:
         robot, edge = self.hosts.names

@@ -8,7 +8,9 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from functools import partial
 from pathlib import Path
+from typing import Any, TextIO
 
 import zenoh
 from deixis_runtime.interrupts import Interrupts
@@ -30,7 +32,7 @@ def main() -> None:
     heard = {topics.BELIEF: {}, topics.TARGET: {}, topics.HEALTH: {"stage": topics.FRAME.stage}}
     with Interrupts() as interrupts, given.file.open("w") as out, zenoh.open(config) as session:
         kept = [
-            session.declare_subscriber(topic.key(given.robot, **parts), lambda sample, topic=topic: note(out, topic, sample))
+            session.declare_subscriber(topic.key(given.robot, **parts), partial(note, out, topic))
             for topic, parts in heard.items()
         ]
         while not interrupts.wait(0.1):
@@ -38,10 +40,10 @@ def main() -> None:
         kept.clear()
 
 
-def note(out: object, topic: Topic, sample: zenoh.Sample) -> None:
+def note(out: TextIO, topic: Topic, sample: zenoh.Sample) -> None:
     """Zenoh callback: one line."""
     now_ns = time.time_ns()
-    message = codec.decode(topic.type, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topic.max_bytes)
+    message: Any = codec.decode(topic.type, sample.payload.to_bytes(), str(sample.encoding), max_bytes=topic.max_bytes)
     line = {"at_s": now_ns / 1e9, "type": topic.type.__name__, "age_s": (now_ns - message.stamp_ns) / 1e9}
     line |= {"notes": getattr(message, "notes", []), "final": getattr(message, "final", False)}
     line |= {"counters": getattr(message, "counters", {}), "poi_ids": getattr(message, "poi_ids", [])}

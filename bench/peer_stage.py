@@ -33,7 +33,7 @@ def peer_config(listen: str, peers: list[str]) -> zenoh.Config:
 def main() -> int:
     """Run the stage until told to stop."""
     stage, listen, peers, *arguments = sys.argv[1:]
-    session.client_config = lambda *_, **__: peer_config(listen, peers.split(","))  # type: ignore[assignment]
+    session.client_config = lambda *_, **__: peer_config(listen, peers.split(","))
     module = importlib.import_module(f"deixis_{stage}.service")
     return int(module.main(arguments))
 

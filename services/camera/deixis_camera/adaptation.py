@@ -1,7 +1,7 @@
 """How much the camera sends, by how its frames arrive: when a picture is held back, and when to take another rung. Pure.
 
 Two parts, one quick and one slow. `InFlight` holds a picture back while those before it are late, so no queue on the way grows,
-whatever the link does. The ladder follows within half a second: where many pictures are held back, frames are too large or too
+whatever the link does. The ladder follows within a second: where many pictures are held back, frames are too large or too
 many, and it goes down to what came through; where all goes well for a while it goes up one rung, to try. A rung that was tried
 in vain is tried again after twice as long each time, so nothing swings to and fro.
 
@@ -19,14 +19,15 @@ from deixis_schemas.messages import FrameId
 from .in_flight import InFlight
 from .ladder import Rung
 
-PERIOD_S = 0.5
+PERIOD_S = 1.0
+CLIMBING_PERIOD_S = 0.5
 LONGEST_PERIOD_S = 2.0
 LEAST_PICTURES = 3
 """Periods with fewer pictures due say nothing yet."""
 MANY_HELD = 0.25
 FEW_HELD = 0.05
 MOST_DOWN = 3
-"""Rungs down at once, at most: what half a second showed may be a passing trouble."""
+"""Rungs down at once, at most: what a second showed may be a passing trouble."""
 USABLE = 0.85
 """Of the bytes a second that came through, to leave room for those that vary."""
 MOST_UP = 2
@@ -60,9 +61,10 @@ class _Period:
         self.arrived_bytes = 0
         self.took_s: list[float] = []
 
-    def is_over(self, now_s: float) -> bool:
+    def is_over(self, now_s: float, usual_s: float) -> bool:
+        """Whether it is long enough to judge by, as a rule `usual_s`."""
         long = now_s - self.began_s
-        return (long >= PERIOD_S and self.due >= LEAST_PICTURES) or long >= LONGEST_PERIOD_S
+        return (long >= usual_s and self.due >= LEAST_PICTURES) or long >= LONGEST_PERIOD_S
 
     def share_held(self) -> float:
         return self.held / self.due if self.due else 0.0
@@ -127,7 +129,7 @@ class Adaptation:
         """Take another rung where it is time to."""
         if self._in_flight.waited_s(now_s) and now_s - self._heard_s >= SILENT_S:
             self._fall_silent(now_s)
-        elif not self._silent and self._period.is_over(now_s):
+        elif not self._silent and self._period.is_over(now_s, CLIMBING_PERIOD_S if self._climbing() else PERIOD_S):
             self._judge(now_s)
             self._begin_period(now_s)
 
@@ -194,7 +196,7 @@ class Adaptation:
         return self._at > self._back_to
 
     def _needed_s(self) -> float:
-        return PERIOD_S if self._climbing() else self._hold_s[self._at - 1]
+        return CLIMBING_PERIOD_S if self._climbing() else self._hold_s[self._at - 1]
 
     def _begin_period(self, now_s: float) -> None:
         self._period = _Period(now_s)
