@@ -6,9 +6,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from deixis_schemas import topics
@@ -32,12 +33,26 @@ class LinkBenchError(RuntimeError):
 
 
 class Layout:
-    """A robot with the camera and an edge with the rest, on two hosts. Use as a context manager; `heard` is what came."""
+    """A robot with the camera and an edge with the rest, on two hosts. Use as a context manager; `heard` is what came.
 
-    def __init__(self, name: str, hosts: Any, folder: Path, source: Path, site: Path) -> None:
+    `camera` holds settings of the camera; with `frames` the listener on the edge reads frames as well.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        hosts: Any,
+        folder: Path,
+        source: Path,
+        site: Path,
+        camera: Mapping[str, object] = MappingProxyType({}),
+        *,
+        frames: bool = False,
+    ) -> None:
         self.name, self.hosts, self.folder = name, hosts, folder
+        self._frames = frames
         self.heard = {host: folder / f"{host}.jsonl" for host in hosts.names}
-        self._camera = {"source": str(source), "loop": "true"}
+        self._camera: dict[str, object] = {"source": source, "loop": "true", **camera}
         if name != "adapted":
             self._camera |= {"encoding": "jpeg", "adapt": "false"}
         self._site = site
@@ -104,7 +119,8 @@ class Layout:
 
     def _listen(self, host: str, endpoint: str, *arguments: str) -> None:
         listener = [sys.executable, ROOT / "bench" / "link_listener.py", ROBOT, endpoint, self.heard[host]]
-        self._start(host, f"listener-{host}", [*listener, *arguments])
+        also = ["--frames"] if self._frames and host == self.hosts.names[1] else []
+        self._start(host, f"listener-{host}", [*listener, *also, *arguments])
 
     def _sets(self, prefix: str) -> list[str]:
         return [part for name, value in self._camera.items() for part in ("--set", f"{prefix}{name}={value}")]

@@ -137,7 +137,7 @@ class Node:
 
     def follow_readers(self, topic: Topic) -> Readers:
         """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
-        return Readers(self._session, self.robot, topic, self._alive, self._router)
+        return Readers(self._session, self.robot, topic, self.producer, self._alive, self._router)
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""

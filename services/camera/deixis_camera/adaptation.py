@@ -1,8 +1,9 @@
 """How much the camera sends, by how its frames arrive: when a picture is held back, and when to take another rung. Pure.
 
 Two parts, one quick and one slow. `InFlight` holds a picture back while those before it are late, so no queue on the way grows,
-whatever the link does. The ladder follows within a second: where many pictures are held back, frames are too large or too
-many, and it goes down to what came through; where all goes well for a while it goes up one rung, to try. A rung that was tried
+whatever the link does. The ladder follows within seconds: where many pictures are held back, or half of the answers stay late,
+frames are too large or too many, and it goes down to what came through; where all goes well for a while it goes up one rung,
+to try. A rung that was tried
 in vain is tried again after twice as long each time, so nothing swings to and fro.
 
 Silence, as of a cut link, is something else: nobody knows what the link will carry when it is back. Then few and small frames
@@ -26,6 +27,10 @@ LEAST_PICTURES = 3
 """Periods with fewer pictures due say nothing yet."""
 MANY_HELD = 0.25
 FEW_HELD = 0.05
+LATE = 2 / 3
+"""Of the slack: answers that are so much later than the quickest, half of them, wait behind others."""
+LATE_S = 2.0
+"""Lateness that stands so long is a queue; a shorter one may be chance."""
 MOST_DOWN = 3
 """Rungs down at once, at most: what a second showed may be a passing trouble."""
 USABLE = 0.85
@@ -34,8 +39,8 @@ MOST_UP = 2
 """Rungs up at once on the way back, which is less than twice the bytes; else one."""
 FIRST_HOLD_S = 2.0
 LONGEST_HOLD_S = 30.0
-TRIED_S = 4.0
-"""Trouble so soon after a step up means that the step was too much."""
+TRIED_S = 10.0
+"""Trouble so soon after a step up means that the step was too much: a queue may grow slowly."""
 SILENT_S = 1.0
 
 
@@ -83,6 +88,7 @@ class Adaptation:
         self._silent = False
         self._hold_s = [FIRST_HOLD_S] * len(rungs)
         self._good_s = 0.0
+        self._late_s = 0.0
         self._climbed_s = now_s - TRIED_S
         self._down_s = now_s - LONGEST_HOLD_S
         self._down_from = 0
@@ -158,7 +164,12 @@ class Adaptation:
         self._took_s = median(period.took_s) if period.took_s else None
         if period.share_held() > MANY_HELD:
             self._go_down(now_s)
-        elif period.share_held() <= FEW_HELD and self._is_quick():
+            return
+        late = self._took_s is not None and self._took_s > self._in_flight.quickest_s() + LATE * self._slack_s
+        self._late_s = self._late_s + long_s if late else 0.0
+        if self._late_s >= LATE_S:
+            self._go_down(now_s)
+        elif period.share_held() <= FEW_HELD and period.took_s and not late:
             self._good_s += long_s
             if self._at > 0 and self._good_s >= self._needed_s():
                 self._go_up(now_s)
@@ -167,14 +178,11 @@ class Adaptation:
         if self._good_s > LONGEST_HOLD_S:
             self._hold_s[self._at] = FIRST_HOLD_S  # what carried for so long is no rung to be wary of
 
-    def _is_quick(self) -> bool:
-        return self._took_s is not None and self._took_s <= self._in_flight.quickest_s() + self._slack_s / 2
-
     def _go_down(self, now_s: float) -> None:
         if now_s - self._climbed_s <= TRIED_S:
             self._hold_s[self._at] = min(LONGEST_HOLD_S, 2 * self._hold_s[self._at])
         self._back_to = len(self._rungs)  # this is what the link carries: from here on up with care
-        self._good_s = 0.0
+        self._good_s = self._late_s = 0.0
         if now_s - self._down_s > PERIOD_S + LONGEST_PERIOD_S:
             self._down_from = self._at
         self._down_s = now_s
