@@ -21,9 +21,11 @@ from .manager import Manager
 from .memory import settle
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
+from .two_links import two_links
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
+OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
 SOCKET_FOLDER_PREFIX = "deixis-"
 
@@ -34,16 +36,21 @@ def router_config(listen: list[str], connect: list[str], file: Path | None = Non
     """Configuration of a host's router. Peers that are not there yet are tried again and again."""
     config = base_config("router", file)
     settings = {
+        "transport/unicast/max_links": 2,
         "transport/link/tx/lease": LEASE_MS,
         # It hands on what stages put into shared memory, and lays out 16 MB of its own for nothing.
         "transport/shared_memory/transport_optimization/enabled": False,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2},
+        # A link that is back is to be found at once. TCP asks ever more seldom: a connection that does not come is begun anew.
+        "connect/retry": {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2},
+        "transport/unicast/open_timeout": OPEN_TIMEOUT_MS,
     }
     if file is None:
         put_settings(config, settings)
+    if json.loads(config.get_json("transport/unicast/max_links")) > 1:
+        connect = [link for endpoint in connect for link in two_links(endpoint)]
     given = {side: json.loads(config.get_json(f"{side}/endpoints")) for side in ("listen", "connect")} if file else {}
     put_settings(config, {"listen/endpoints": listen + _endpoints(given.get("listen"))})
     put_settings(config, {"connect/endpoints": connect + _endpoints(given.get("connect"))})

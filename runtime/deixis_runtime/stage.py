@@ -67,6 +67,7 @@ class Node:
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
         self._clocks: list[ClockWatch] = []
+        self._clock_of_frames: ClockWatch | None = None  # for ages only; said by who is asked to follow it
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._token: Any = None
@@ -78,7 +79,10 @@ class Node:
     def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
         """Listen to a topic and keep its newest `depth` samples."""
         key = topic.key(self.robot)
-        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn, lockstep=self.lockstep)
+        clock = self._frames_clock() if topic is topics.FRAME else None
+        subscription: Subscription[Any] = Subscription(
+            topic, key, depth, self.wake, self.warn, lockstep=self.lockstep, clock=clock
+        )
         self._declared.append(self._session.declare_subscriber(key, subscription.store))
         self._inputs.append(subscription)
         return subscription
@@ -135,7 +139,7 @@ class Node:
 
     def follow_readers(self, topic: Topic) -> Readers:
         """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
-        return Readers(self._session, self.robot, topic, self._alive, self._router)
+        return Readers(self._session, self.robot, topic, self.producer, self._alive, self._router)
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
@@ -257,7 +261,14 @@ class Node:
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
+    def _frames_clock(self) -> ClockWatch | None:
+        if self._clock_of_frames is None and not self.lockstep:
+            self._clock_of_frames = ClockWatch(self._session, self.robot, topics.FRAME.stage)
+        return self._clock_of_frames
+
     def _look_at_clocks(self) -> None:
+        if self._clock_of_frames is not None:
+            self._clock_of_frames.turn()
         for watch in self._clocks:
             watch.turn()
             complaint = watch.complaint()
