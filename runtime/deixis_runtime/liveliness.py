@@ -21,6 +21,11 @@ class AliveStages:
         """Names of the stages whose token stands."""
         return {key.split("/")[-2] for key in tuple(self._tokens)}
 
+    def instances(self, stage: str) -> set[str]:
+        """Names of the processes of a stage whose token stands."""
+        parts = [key.split("/") for key in tuple(self._tokens)]
+        return {instance for *_, name, instance in parts if name == stage}
+
     def _note(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         if sample.kind == zenoh.SampleKind.PUT:
