@@ -139,13 +139,13 @@ class Run:
 def name_of(pid: int) -> str | None:
     """Which of ours a process is; none for another, or one that has ended."""
     try:
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+        line = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
     except (FileNotFoundError, ProcessLookupError):
         return None
-    if b"deixis_runtime.router" in words:
+    if " deixis_runtime.router " in line:
         return ROUTER
-    scripts = {f"deixis-{stage}": stage for stage in topics.STAGES}
-    return next((scripts[name] for word in words if (name := Path(os.fsdecode(word)).name) in scripts), None)
+    # Forked or not: `deixis-camera ...` or `/.../python /.../bin/deixis-camera ...`.
+    return next((stage for stage in topics.STAGES if re.search(rf"(^|/)deixis-{stage} ", line)), None)
 
 
 def wait_for(look: Callable[[], T | None], timeout_s: float) -> T | None:

@@ -8,6 +8,8 @@ import time
 from typing import Any
 
 import zenoh
+from deixis_runtime.certificates import certificates_of
+from deixis_runtime.endpoint import why_unanswered
 from deixis_runtime.finding import Finding
 from deixis_runtime.session import Unreachable, open_client
 from deixis_schemas import topics
@@ -16,9 +18,7 @@ from deixis_schemas.topics import By, Delivery
 from rich.console import Console
 from rich.text import Text
 
-from .certificates import certificates_of
 from .checks import Listening, findings
-from .endpoint import why_unanswered
 from .gets import get_all
 from .inbox import Inbox
 from .local import examine_machine

@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 import platform
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from deixis_runtime.certificate_check import examine
+from deixis_runtime.certificates import certificates_of
 from deixis_runtime.finding import LOCAL_CHECKS, Finding
 from deixis_runtime.host import installed_stages
 from deixis_runtime.versions import versions_of
-
-from .certificates import VARIABLE, certificates_of
 
 SHARED_MEMORY = Path("/dev/shm")
 SESSION_BYTES = 16 << 20
@@ -37,12 +38,7 @@ def examine_machine(source: str | None) -> Iterator[Finding]:
     yield from shared_memory(SHARED_MEMORY, room(SHARED_MEMORY), len(stages) + 1)
     certificates = certificates_of()
     if certificates is not None:
-        problem = certificates.problem()
-        yield (
-            Finding("wrong", problem, f"mend that, or name another folder in {VARIABLE}")
-            if problem
-            else Finding("ok", f"the certificate in {certificates.folder} and its key belong together")
-        )
+        yield examine(certificates, time.time())
     for point in sorted(entry_points(group=LOCAL_CHECKS), key=lambda point: point.name):
         yield from point.load()(source)
 

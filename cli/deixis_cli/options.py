@@ -59,6 +59,11 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         help="override a setting, e.g. camera.encoding=jpeg; may be given again",
     )
     parser.add_argument("--registry", type=Path, metavar="FILE", help="SQLite file of the points of interest")
+    parser.add_argument(
+        "--no-fork",
+        action="store_true",
+        help="start each process from nothing, not forked from one that has done the imports: more memory, slower",
+    )
 
 
 def host_options(given: argparse.Namespace, source: dict[str, str] | None = None, **others: object) -> HostOptions:
@@ -82,7 +87,8 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
             raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
     site = given.site.resolve() if given.site is not None else None
     listen = tuple(given.listen or (DEFAULT_ENDPOINT,))
-    return HostOptions(robot=given.robot, stages=stages, site=site, listen=listen, sets=sets, **others)  # type: ignore[arg-type]
+    fork = not given.no_fork
+    return HostOptions(robot=given.robot, stages=stages, site=site, listen=listen, sets=sets, fork=fork, **others)  # type: ignore[arg-type]
 
 
 def stage_settings(items: list[str]) -> dict[str, tuple[str, ...]]:

@@ -18,6 +18,7 @@ import zenoh
 from deixis_schemas import topics
 
 from .hang_watch import HangWatch
+from .launching import Forkable, ForkServer
 from .leftovers import Leftovers, remove_unused
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
@@ -35,6 +36,7 @@ log = logging.getLogger("deixis-supervisor")
 POLL_S = 0.02
 HELD_PERIOD_S = 0.5
 ROUTER = "router"
+ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
 SOURCE = topics.FRAME.stage
 """The stage that all begins with."""
 
@@ -45,7 +47,7 @@ class HostFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class HostOptions:
-    """What runs on a host and where it is reached."""
+    """What runs on a host and where it is reached. fork: its processes are forked from one that has done their imports."""
 
     robot: str
     stages: tuple[str, ...]
@@ -56,6 +58,7 @@ class HostOptions:
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
+    fork: bool = True
 
 
 def installed_stages() -> set[str]:
@@ -128,6 +131,7 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
+        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:
@@ -171,8 +175,17 @@ class Host:
         if removed:
             log.info("removed %d files of shared memory that a killed process left", removed)
 
+    def forkables(self) -> list[Forkable]:
+        """The router and our own stages, of which a test holds that their imports start no threads."""
+        own = [item.name for item in entry_points(group="deixis.stages") if item.value == f"deixis_{item.name}.service:main"]
+        stages = [name for name in self.options.stages if name in own]
+        return [
+            Forkable(ROUTER_COMMAND, "deixis_runtime.router:main"),
+            *(Forkable((str(_script(name)),), f"deixis_{name}.service:main") for name in stages),
+        ]
+
     def _start_router(self) -> None:
-        command = [sys.executable, "-m", "deixis_runtime.router", "--supervised", "--listen", self.endpoint]
+        command = [*ROUTER_COMMAND, "--supervised", "--listen", self.endpoint]
         for endpoint in self.options.listen:
             command += ["--listen", endpoint]
         for endpoint in self.options.connect:
@@ -207,7 +220,7 @@ class Host:
         return set(names) - (self._node.alive_stages() if self._node else set())
 
     def _stage_command(self, name: str) -> list[str]:
-        script = Path(sys.executable).parent / f"deixis-{name}"
+        script = _script(name)
         if not script.exists():
             raise HostFailed(f"stage '{name}' is registered but its command {script.name} is not beside {sys.executable}")
         command = [str(script), "--supervised", "--robot", self.options.robot, "--connect", self.endpoint]
@@ -232,3 +245,8 @@ class Host:
                 raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
             self._tell(time.monotonic())
             time.sleep(POLL_S)
+
+
+def _script(stage: str) -> Path:
+    """The command of a stage."""
+    return Path(sys.executable).parent / f"deixis-{stage}"

@@ -21,10 +21,9 @@ class AliveStages:
         """Names of the stages whose token stands."""
         return {key.split("/")[-2] for key in tuple(self._tokens)}
 
-    def instances(self, stage: str) -> set[str]:
-        """Names of the processes of a stage whose token stands."""
-        parts = [key.split("/") for key in tuple(self._tokens)]
-        return {instance for *_, name, instance in parts if name == stage}
+    def processes(self) -> set[tuple[str, str]]:
+        """(stage, instance) of the processes whose token stands."""
+        return {(key.split("/")[-2], key.split("/")[-1]) for key in tuple(self._tokens)}
 
     def _note(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)

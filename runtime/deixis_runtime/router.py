@@ -18,6 +18,7 @@ import zenoh
 from .interrupts import Interrupts
 from .limit import RateLimit
 from .manager import Manager
+from .memory import settle
 from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
@@ -36,6 +37,8 @@ def router_config(listen: list[str], connect: list[str], file: Path | None = Non
     config = base_config("router", file)
     settings = {
         "transport/link/tx/lease": LEASE_MS,
+        # It hands on what stages put into shared memory, and lays out 16 MB of its own for nothing.
+        "transport/shared_memory/transport_optimization/enabled": False,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
@@ -87,6 +90,7 @@ def _watch_links(
 ) -> None:
     linked: bool | None = None
     manager, limit, look_s = Manager(os.environ), RateLimit(), 0.0
+    settle()
     while not interrupts.requested():
         if parent is not None and parent.gone():
             log.error("the supervisor is gone; stopping")

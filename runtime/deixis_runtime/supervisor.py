@@ -10,6 +10,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from .launching import Child, start_process
 from .restarts import Restarts
 from .settings import STARTED_BEFORE
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE
@@ -33,7 +34,7 @@ class Process:
     name: str
     argv: list[str]
     needs: str | None = None
-    popen: subprocess.Popen[bytes] | None = None
+    popen: Child | None = None
     restarts: Restarts = field(default_factory=Restarts)
     started: int = 0
     started_s: float = 0.0
@@ -55,6 +56,7 @@ class Supervisor:
     def __init__(self) -> None:
         self.processes: dict[str, Process] = {}
         self.environment: Mapping[str, str] = os.environ
+        self.launch = start_process
 
     def start(self, name: str, argv: list[str], needs: str | None = None) -> None:
         """Start a child. It gets its own session, so that Ctrl-C reaches the supervisor alone, which stops them in order."""
@@ -114,7 +116,7 @@ class Supervisor:
             process.popen.kill()
             self._await_killed(process.popen, process.name)
 
-    def _await_killed(self, popen: subprocess.Popen[bytes], name: str) -> None:
+    def _await_killed(self, popen: Child, name: str) -> None:
         try:
             popen.wait(KILL_TIMEOUT_S)
         except subprocess.TimeoutExpired:  # within a system call that does not return, as of a broken device
@@ -126,14 +128,15 @@ class Supervisor:
         process.started += 1
         process.started_s = time.monotonic()
         try:
-            process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+            process.popen = self.launch(process.argv, environment)
         except OSError as error:
             process.given_up = f"it cannot be started: {error.strerror}"
             log.error("%s is given up: %s", process.name, process.given_up)
 
     def _plan_restart(self, process: Process, now_s: float) -> None:
         assert process.popen is not None
-        status = process.popen.returncode
+        status = process.popen.poll()
+        assert status is not None
         process.last_end, process.ended_s = process.killed_for or say_status(status), now_s
         process.killed_for = ""
         if status == EXIT_CONFIG:

@@ -53,7 +53,7 @@ class Running:
 
     def pids(self):
         """Process numbers by name, of those who run now."""
-        words = {name: "deixis_runtime.router" if name == ROUTER else f"bin/deixis-{name}" for name in EVERYBODY}
+        words = {name: "deixis_runtime.router" if name == ROUTER else f"deixis-{name}" for name in EVERYBODY}
         return {name: child_called(self.child.pid, word) for name, word in words.items()}
 
     def status(self):

@@ -6,13 +6,14 @@ import errno
 import os
 import socket
 import ssl
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from deixis_runtime.finding import Finding
-
+from . import certificate_check
 from .certificates import Certificates
+from .finding import Finding
 
 WAIT_S = 2.0
 GREETING_WAIT_S = 0.5
@@ -21,7 +22,7 @@ OVER_TCP = ("tcp", "tls", "ws")
 PROTOCOLS = (*OVER_TCP, "quic", "udp", SOCKET)
 START_ROUTER = "start one there with 'deixis run' or 'deixis up --listen ...', or name another with --connect"
 SPEAKS_TLS = "name it as tls/... and give the folder of this host's certificate"
-GIVE_CERTIFICATES = "name the folder with ca.pem, cert.pem and key.pem of this host in DEIXIS_CERTS"
+GIVE_CERTIFICATES = "name the folder with ca.pem, cert.pem and key.pem of this host in --certs or DEIXIS_CERTS"
 
 
 @dataclass(frozen=True)
@@ -149,9 +150,9 @@ def _tls_is_spoken(endpoint: Endpoint) -> bool | None:
 
 def _why_tls(text: str, endpoint: Endpoint, connection: socket.socket, certificates: Certificates | None) -> Finding:
     """Go through the handshake as Zenoh does, and see who refuses whom."""
-    problem = certificates.problem() if certificates is not None else None
-    if problem:
-        return Finding("wrong", problem, "make it anew, or name another folder")
+    ours = certificate_check.problem(certificates, time.time()) if certificates is not None else None
+    if ours is not None:
+        return ours
     connection.settimeout(WAIT_S)
     try:
         with _tls_context(certificates).wrap_socket(connection, server_hostname=endpoint.host) as secure:

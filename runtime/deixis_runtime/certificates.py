@@ -1,0 +1,45 @@
+"""The folder with this host's certificate, and the environment variable that names it. What it holds: `certificate_check`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+VARIABLE = "DEIXIS_CERTS"
+SOON_DAYS = 30
+"""A certificate that expires within so many days is worth a word."""
+
+
+@dataclass(frozen=True)
+class Certificates:
+    """A folder that holds `ca.pem`, `cert.pem` and `key.pem`, on a host with a router also `access.json`."""
+
+    folder: Path
+
+    @property
+    def ca(self) -> Path:
+        """The certificate of the site's CA."""
+        return self.folder / "ca.pem"
+
+    @property
+    def certificate(self) -> Path:
+        """The certificate of this host."""
+        return self.folder / "cert.pem"
+
+    @property
+    def key(self) -> Path:
+        """The key of this host's certificate."""
+        return self.folder / "key.pem"
+
+    @property
+    def access(self) -> Path:
+        """The list of those who may link to the site's routers."""
+        return self.folder / "access.json"
+
+
+def certificates_of(environment: Mapping[str, str] = os.environ) -> Certificates | None:
+    """The folder that the environment names; None where it names none."""
+    folder = environment.get(VARIABLE)
+    return Certificates(Path(folder)) if folder else None
