@@ -19,6 +19,7 @@ from .interrupts import Interrupts
 from .limit import RateLimit
 from .manager import Manager
 from .memory import settle
+from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_UNREACHABLE, setup_logging
 from .two_links import two_links
@@ -27,6 +28,7 @@ from .two_links import two_links
 LEASE_MS = 2000
 OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
+TURN_S = 0.1
 SOCKET_FOLDER_PREFIX = "deixis-"
 
 log = logging.getLogger("deixis-router")
@@ -67,14 +69,14 @@ def main(argv: list[str] | None = None) -> int:
     given = parser.parse_args(argv)
     setup_logging()
     zenoh.init_log_from_env_or("error")
-    parent = os.getppid() if given.supervised else None
+    parent = Parent(os.environ) if given.supervised else None
     with Interrupts() as interrupts:
         status = _route(given, interrupts, parent)
     exit_now(status)
     return status
 
 
-def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None) -> int:
+def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | None) -> int:
     try:
         session = zenoh.open(router_config(given.listen, given.connect, given.config))
     except Unreachable as error:
@@ -91,23 +93,25 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None
 
 
 def _watch_links(
-    session: zenoh.Session, listen: list[str], connect: list[str], interrupts: Interrupts, parent: int | None
+    session: zenoh.Session, listen: list[str], connect: list[str], interrupts: Interrupts, parent: Parent | None
 ) -> None:
     linked: bool | None = None
-    manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    manager, limit, look_s = Manager(os.environ), RateLimit(), 0.0
     settle()
-    _tell_manager(manager, limit, "routing")
-    while not interrupts.wait(CHECK_S):
-        if parent is not None and os.getppid() != parent:
+    while not interrupts.requested():
+        if parent is not None and parent.gone():
             log.error("the supervisor is gone; stopping")
             _remove_socket_folders(listen)
             return
-        now = bool(session.info.routers_zid())
-        if connect and now != linked:
-            level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
-            log.log(level, text, ", ".join(connect))
-        linked = now
+        if time.monotonic() >= look_s:
+            look_s = time.monotonic() + CHECK_S
+            now = bool(session.info.routers_zid())
+            if connect and now != linked:
+                level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
+                log.log(level, text, ", ".join(connect))
+            linked = now
         _tell_manager(manager, limit, "linked" if linked else "no link to another router")
+        interrupts.wait(TURN_S)
 
 
 def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:
