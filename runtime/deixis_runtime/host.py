@@ -20,9 +20,10 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health
 
 from .limit import RateLimit
+from .link_security import LinkSecurity, SecurityError
 from .liveliness import AliveStages
-from .router import SOCKET_FOLDER_PREFIX
-from .session import DEFAULT_ENDPOINT, open_client
+from .router import SOCKET_FOLDER_PREFIX, router_config
+from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .supervisor import Supervisor
 from .watchdog import Patience, Watchdog
 
@@ -40,7 +41,7 @@ class HostFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class HostOptions:
-    """What runs on a host and where it is reached."""
+    """What runs on a host, where it is reached, and how its links are guarded."""
 
     robot: str
     stages: tuple[str, ...]
@@ -48,6 +49,7 @@ class HostOptions:
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     connect: tuple[str, ...] = ()
     zenoh_config: Path | None = None
+    security: LinkSecurity = field(default_factory=LinkSecurity)
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
@@ -144,6 +146,11 @@ class Host:
             self.supervisor.kill(name, why)
 
     def _start_router(self) -> None:
+        options = self.options
+        try:  # before anything starts, so that the reason is the last that is said
+            router_config(list(options.listen), list(options.connect), options.zenoh_config, options.security)
+        except (SecurityError, Unreachable) as error:
+            raise HostFailed(str(error)) from None
         command = [sys.executable, "-m", "deixis_runtime.router", "--supervised", "--listen", self.endpoint]
         for endpoint in self.options.listen:
             command += ["--listen", endpoint]
@@ -151,6 +158,8 @@ class Host:
             command += ["--connect", endpoint]
         if self.options.zenoh_config:
             command += ["--config", str(self.options.zenoh_config)]
+        command += ["--insecure"] if options.security.insecure else []
+        command += ["--frames-stay"] if options.security.frames_stay else []
         self.supervisor.start(ROUTER, command)
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
