@@ -13,6 +13,8 @@ RUN pip wheel --quiet --no-cache-dir --no-build-isolation --no-deps --wheel-dir 
 
 FROM python:3.11-slim-bookworm
 ENV PYTHONUNBUFFERED=1 \
+    # As deixis_runtime.environment has it.
+    OPENBLAS_NUM_THREADS=1 \
     # Two fresh buffers a frame cost hundreds of page faults where malloc gives large blocks back at once.
     MALLOC_MMAP_THRESHOLD_=67108864 \
     MALLOC_TRIM_THRESHOLD_=134217728
@@ -20,7 +22,7 @@ ENV PYTHONUNBUFFERED=1 \
 # version, say the distributions and constraints.txt; pip below adds whatever is missing here.
 COPY constraints.txt /tmp/constraints.txt
 RUN pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
-    cryptography eclipse-zenoh msgpack numpy "opencv-python-headless<5" pydantic pyyaml rich
+    cryptography eclipse-zenoh msgpack numpy "opencv-python-headless<5" pydantic pyyaml rich setproctitle
 COPY --from=wheels /wheels /wheels
 RUN pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
     /wheels/deixis_schemas-*.whl "$(echo /wheels/deixis_runtime-*.whl)[images]" /wheels/deixis_cli-*.whl

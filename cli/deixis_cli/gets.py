@@ -13,6 +13,8 @@ from deixis_runtime.delivery import GET_PRIORITY
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import MAX_POIS, Health, Message, Poi, State
 
+from .raw_message import RawMessage
+
 T = TypeVar("T", bound=Message)
 
 TIMEOUT_S = 1.5
@@ -55,6 +57,12 @@ def get_all(
         elif taken is not None:
             good.append(taken)
     return good, bad
+
+
+def get_raw(session: zenoh.Session, selector: str, timeout_s: float = TIMEOUT_S) -> list[RawMessage]:
+    """The replies to a get as they were sent. Error replies and silence are left out."""
+    sent = [reply.ok for reply in _replies(session, selector, timeout_s=timeout_s) if reply.ok is not None]
+    return [RawMessage(str(s.key_expr), str(s.encoding), s.payload.to_bytes(), time.time_ns()) for s in sent]
 
 
 def get_state(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S, *, rows: int | None = None) -> State | None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Frame, Message
 from deixis_schemas.topics import Topic
+
+from .raw_message import RawMessage
 
 # A raw VGA frame is 0.9 MB: a slow reader holds 60 MB of them at most, and loses the oldest first.
 MAX_FRAMES = 64
@@ -62,34 +65,45 @@ class Inbox:
         self._event.wait(timeout_s)
         self._event.clear()
 
-    def take_all(self) -> list[Received]:
-        """What came since the last call, in its order. What breaks the contract is counted in `rejected` and left out."""
+    def take_raw(self) -> Iterator[RawMessage]:
+        """What came since the last call as it was sent, in its order, also what breaks the contract."""
         with self._lock:
             stored = [*self._frames, *self._others]
             self._frames.clear()
             self._others.clear()
         stored.sort(key=lambda item: item.order)
-        return [received for item in stored if (received := self._read(item)) is not None]
+        return map(_raw, stored)  # one at a time: a second copy of all frames would be another 60 MB
 
-    def _read(self, item: _Stored) -> Received | None:
-        key = str(item.sample.key_expr)
-        topic = topics.topic_of(key)
+    def take_all(self) -> list[Received]:
+        """What came since the last call, in its order. What breaks the contract is counted in `rejected` and left out."""
+        return [received for raw in self.take_raw() if (received := self.read(raw)) is not None]
+
+    def read(self, raw: RawMessage) -> Received | None:
+        """The message; none where it breaks the contract, which is counted in `rejected`."""
+        topic = topics.topic_of(raw.key)
         if topic is None:
-            self._reject(key, "a key outside the contract")
+            self._reject(raw.key, "a key outside the contract")
             return None
-        if item.sample.kind == zenoh.SampleKind.DELETE:
-            return Received(key, topic, None, item.received_ns)
+        if raw.deleted:
+            return Received(raw.key, topic, None, raw.received_ns)
         try:
-            message = read_message(topic, key, item.sample.payload.to_bytes(), str(item.sample.encoding))
+            message = read_message(topic, raw.key, raw.payload, raw.encoding)
         except codec.CodecError as error:
-            self._reject(key, str(error))
+            self._reject(raw.key, str(error))
             return None
-        return Received(key, topic, message, item.received_ns)
+        return Received(raw.key, topic, message, raw.received_ns)
 
     def _reject(self, key: str, why: str) -> None:
         self.rejected += 1
         if key in self.rejections or len(self.rejections) < 16:
             self.rejections[key] = why
+
+
+def _raw(item: _Stored) -> RawMessage:
+    sample = item.sample
+    if sample.kind == zenoh.SampleKind.DELETE:
+        return RawMessage(str(sample.key_expr), "", b"", item.received_ns, deleted=True)
+    return RawMessage(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), item.received_ns)
 
 
 def read_message(topic: Topic, key: str, payload: bytes, encoding: str) -> Message:

@@ -65,6 +65,11 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         help="override a setting, e.g. camera.encoding=jpeg; may be given again",
     )
     parser.add_argument("--registry", type=Path, metavar="FILE", help="SQLite file of the points of interest")
+    parser.add_argument(
+        "--no-fork",
+        action="store_true",
+        help="start each process from nothing, not forked from one that has done the imports: more memory, slower",
+    )
 
 
 def host_options(given: argparse.Namespace, source: dict[str, str] | None = None, **others: object) -> HostOptions:
@@ -96,6 +101,7 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
         listen=listen,
         sets=sets,
         security=security,
+        fork=not given.no_fork,
         **others,  # type: ignore[arg-type]
     )
 

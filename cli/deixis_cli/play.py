@@ -17,9 +17,11 @@ from deixis_runtime.session import Unreachable, first_line
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
-from .gets import get_healths, get_names, get_state
+from .gets import get_healths, get_names, get_raw, get_state
 from .inbox import Inbox, Received
+from .mcap_file import McapFileError, McapRecorder
 from .play_end import PlayEnd
+from .raw_message import RawMessage
 from .recorder import Recorder, RecorderError
 
 log = logging.getLogger("deixis-play")
@@ -58,6 +60,8 @@ def play(
     options: HostOptions,
     *,
     out: Path | None = None,
+    mcap: Path | None = None,
+    pictures: bool = False,
     name: str = "run",
     on_message: OnMessage | None = None,
     beside: Beside | None = None,
@@ -65,7 +69,8 @@ def play(
 ) -> PlayResult:
     """Start the host's stages, play the source of the camera's settings to its end, and stop them.
 
-    `out` is the folder that gets `NAME.jsonl`. `on_message` is called in this thread with (key, message) for each message,
+    `out` is the folder that gets `NAME.jsonl`; `mcap` a file that gets all as it was sent, frames with `pictures` only.
+    `on_message` is called in this thread with (key, message) for each message,
     frames without image bytes. `beside` is entered with the run's session when all stages but the source are ready, and left
     at the end: for those who have something to say in the run themselves. Ends when the source has ended and is answered, has
     failed, on SIGINT or SIGTERM, or after `timeout_s` seconds; a live or looping source has no other end. Never raises for
@@ -78,9 +83,12 @@ def play(
         with ExitStack() as stack:
             if out is not None:
                 playback.recorder = stack.enter_context(Recorder(out, name))
+            if mcap is not None:
+                playback.mcap = stack.enter_context(McapRecorder(mcap))
+                playback.pictures = pictures
             playback.interrupts = stack.enter_context(Interrupts())
             playback.run(stack.enter_context(Host(options)))
-    except (HostFailed, Unreachable, RecorderError) as error:
+    except (HostFailed, Unreachable, RecorderError, McapFileError) as error:
         playback.result.failure = str(error)
     except zenoh.ZError as error:
         playback.result.failure = f"Zenoh: {first_line(error)}"
@@ -93,6 +101,8 @@ class Playback:
     def __init__(self, options: HostOptions, on_message: OnMessage | None, deadline_s: float | None) -> None:
         self.result = PlayResult()
         self.recorder: Recorder | None = None
+        self.mcap: McapRecorder | None = None
+        self.pictures = False
         self.interrupts = Interrupts()
         self.beside: Beside | None = None
         self._options = options
@@ -104,12 +114,15 @@ class Playback:
         self._targets: deque[Target] = deque(maxlen=MAX_TARGETS)
 
     def run(self, host: Host) -> None:
-        """From the first process to the last answer. Raises HostFailed, Unreachable, RecorderError or zenoh.ZError."""
+        """From the first process to the last answer. Raises HostFailed, Unreachable, zenoh.ZError, or for a file an OSError."""
         with ExitStack() as stack:
 
             def listen() -> None:
                 subscriber = host.session.declare_subscriber(f"deixis/{self._options.robot}/**", self._inbox.store)
                 stack.callback(subscriber.undeclare)
+                if self.mcap is not None and topics.POI.stage in self._options.stages:
+                    for poi in get_raw(host.session, topics.POI.key(self._options.robot, id="*")):
+                        self.mcap.write(poi)  # said before we listened, or in the site file alone
                 if self.beside is not None:
                     stack.enter_context(self.beside(host.session))
 
@@ -153,9 +166,16 @@ class Playback:
 
     def _turn(self, host: Host) -> None:
         self._inbox.wait(TURN_S)
-        for received in self._inbox.take_all():
-            self._take(received)
+        for raw in self._inbox.take_raw():
+            self._keep(raw)
+            received = self._inbox.read(raw)
+            if received is not None:
+                self._take(received)
         host.poll()
+
+    def _keep(self, raw: RawMessage) -> None:
+        if self.mcap is not None and (self.pictures or topics.topic_of(raw.key) is not topics.FRAME):
+            self.mcap.write(raw)
 
     def _take(self, received: Received) -> None:
         message = received.message

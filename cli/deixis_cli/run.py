@@ -34,11 +34,29 @@ def register(subparsers: Any) -> None:
     add_host(parser)
     parser.add_argument("--lockstep", action="store_true", help="feed a frame when the last is answered: reproducible")
     parser.add_argument("--loop", action="store_true", help="play a file again and again")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write NAME.jsonl there, one line per message published")
+    add_out(parser)
     parser.add_argument("--expect", metavar="POI_ID", help="succeed only if the single final answer is exactly this POI")
     parser.add_argument("--timeout", type=float, metavar="SECONDS", help="give up when the source has not ended by then")
     add_json(parser, "print one JSON document at the end, and nothing before")
     parser.set_defaults(run=run)
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    """--out and --pictures."""
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write NAME.jsonl there, a line per message published, and NAME.mcap for replay"
+    )
+    parser.add_argument(
+        "--pictures", action="store_true", help="with --out: NAME.mcap holds the frames as well (raw ones are 27 MB a second)"
+    )
+
+
+def out_options(given: argparse.Namespace, name: str) -> dict[str, Any]:
+    """What `play` is to write, of a run of this name. Raises CommandError."""
+    if given.out is None and given.pictures:
+        raise CommandError("--pictures goes with --out")
+    mcap = None if given.out is None else given.out / f"{name}.mcap"
+    return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
 
 
 def run(given: argparse.Namespace) -> int:
@@ -52,8 +70,7 @@ def run(given: argparse.Namespace) -> int:
     with view as shown:
         result = play(
             options,
-            out=given.out,
-            name=source.name,
+            **out_options(given, source.name),
             on_message=shown.hear if shown else None,
             timeout_s=given.timeout,
         )
@@ -65,17 +82,17 @@ def run(given: argparse.Namespace) -> int:
     return exit_status(result, endless=source.live or given.loop, expected=given.expect)
 
 
-def exit_status(result: PlayResult, *, endless: bool, expected: str | None) -> int:
+def exit_status(result: PlayResult, *, endless: bool, expected: str | None, command: str = "run") -> int:
     """The status of a run, with its cause on standard error. An `endless` source is ended by an interrupt in good order."""
     if result.failure is not None and result.signal is None:
-        print(f"deixis run: {result.failure}", file=sys.stderr)
+        print(f"deixis {command}: {result.failure}", file=sys.stderr)
         return 1
     if result.signal is not None and not (endless and result.frames):
-        print(f"deixis run: stopped by {signal.Signals(result.signal).name} before the end", file=sys.stderr)
+        print(f"deixis {command}: stopped by {signal.Signals(result.signal).name} before the end", file=sys.stderr)
         return 128 + result.signal
     if expected is not None and [target.poi_ids for target in result.targets] != [[expected]]:
         answers = "; ".join(" or ".join(target.poi_ids) or "no answer" for target in result.targets) or "no pointing at all"
-        print(f"deixis run: expected the one answer '{expected}', but got: {answers}", file=sys.stderr)
+        print(f"deixis {command}: expected the one answer '{expected}', but got: {answers}", file=sys.stderr)
         return EXPECTED_MISSED
     return 0
 

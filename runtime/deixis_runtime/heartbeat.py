@@ -66,7 +66,12 @@ class Heartbeat:
         self._next_s = time.monotonic() + PERIOD_S
 
     def record(
-        self, now_ns: int, inputs: list[Subscription], outputs: list[Publisher], clocks: Sequence[ClockHealth] = ()
+        self,
+        now_ns: int,
+        inputs: list[Subscription],
+        outputs: list[Publisher],
+        clocks: Sequence[ClockHealth] = (),
+        router: str = "",
     ) -> Health:
         """The record as of now."""
         steps = self._steps.last_second_ms(time.monotonic())
@@ -79,6 +84,7 @@ class Heartbeat:
             reason=self.reason[:2000],
             pid=os.getpid(),
             host=socket.gethostname(),
+            router=router,
             uptime_s=round(time.monotonic() - self._started_s, 3),
             cpu_s=round(time.process_time(), 3),
             rss_mb=round(resident_mb(), 1),

@@ -19,6 +19,7 @@ import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health
 
+from .launching import Forkable, ForkServer
 from .limit import RateLimit
 from .link_security import LinkSecurity, SecurityError
 from .liveliness import AliveStages
@@ -31,6 +32,7 @@ log = logging.getLogger("deixis-supervisor")
 
 POLL_S = 0.05
 ROUTER = "router"
+ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
 SOURCE = topics.FRAME.stage
 """The stage that all begins with."""
 
@@ -41,7 +43,10 @@ class HostFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class HostOptions:
-    """What runs on a host, where it is reached, and how its links are guarded."""
+    """What runs on a host, where it is reached, and how its links are guarded.
+
+    fork: its processes are forked from one that has done their imports.
+    """
 
     robot: str
     stages: tuple[str, ...]
@@ -53,6 +58,7 @@ class HostOptions:
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
+    fork: bool = True
 
 
 def installed_stages() -> set[str]:
@@ -118,6 +124,7 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
+        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:
@@ -145,13 +152,22 @@ class Host:
         for name, why in hanging.items():
             self.supervisor.kill(name, why)
 
+    def forkables(self) -> list[Forkable]:
+        """The router and our own stages, of which a test holds that their imports start no threads."""
+        own = [item.name for item in entry_points(group="deixis.stages") if item.value == f"deixis_{item.name}.service:main"]
+        stages = [name for name in self.options.stages if name in own]
+        return [
+            Forkable(ROUTER_COMMAND, "deixis_runtime.router:main"),
+            *(Forkable((str(_script(name)),), f"deixis_{name}.service:main") for name in stages),
+        ]
+
     def _start_router(self) -> None:
         options = self.options
         try:  # before anything starts, so that the reason is the last that is said
             router_config(list(options.listen), list(options.connect), options.zenoh_config, options.security)
         except (SecurityError, Unreachable) as error:
             raise HostFailed(str(error)) from None
-        command = [sys.executable, "-m", "deixis_runtime.router", "--supervised", "--listen", self.endpoint]
+        command = [*ROUTER_COMMAND, "--supervised", "--listen", self.endpoint]
         for endpoint in self.options.listen:
             command += ["--listen", endpoint]
         for endpoint in self.options.connect:
@@ -178,7 +194,7 @@ class Host:
         return set(names) - self._alive.stages()
 
     def _stage_command(self, name: str) -> list[str]:
-        script = Path(sys.executable).parent / f"deixis-{name}"
+        script = _script(name)
         if not script.exists():
             raise HostFailed(f"stage '{name}' is registered but its command {script.name} is not beside {sys.executable}")
         command = [str(script), "--supervised", "--robot", self.options.robot, "--connect", self.endpoint]
@@ -213,3 +229,8 @@ class Host:
             return
         if health.host == socket.gethostname():
             self._heard.append((health.pid, health.count, time.monotonic()))
+
+
+def _script(stage: str) -> Path:
+    """The command of a stage."""
+    return Path(sys.executable).parent / f"deixis-{stage}"

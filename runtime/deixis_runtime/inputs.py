@@ -20,6 +20,7 @@ T = TypeVar("T", bound=Message)
 
 HEARD_WITHIN_S = 3.0
 MAX_PRODUCERS = 8
+MAX_OVERSIZED = 1024
 
 
 class Subscription(Generic[T]):
@@ -54,6 +55,7 @@ class Subscription(Generic[T]):
         self._report = report
         self._lock = threading.Lock()
         self._samples: deque[tuple[int, zenoh.Sample]] = deque(maxlen=depth)
+        self._oversized: deque[tuple[str, int]] = deque(maxlen=MAX_OVERSIZED)
         self._heard: dict[str, tuple[float, float]] = {}
         self._accepted_s: float | None = None
         self._rate = Rate(time.monotonic())
@@ -64,8 +66,14 @@ class Subscription(Generic[T]):
     def store(self, sample: zenoh.Sample) -> None:
         """Callback of the Zenoh subscriber; runs on one of its threads."""
         received_ns = time.monotonic_ns()
+        size = len(sample.payload)
         with self._lock:
             self.received += 1
+            if size > self.topic.max_bytes:
+                # Not kept until the loop comes to refuse it: a few of any size fill the memory.
+                self._oversized.append((str(sample.key_expr), size))
+                self._wake()
+                return
             if len(self._samples) == self._samples.maxlen:
                 self.overwritten += 1
             self._samples.append((received_ns, sample))
@@ -83,8 +91,11 @@ class Subscription(Generic[T]):
     def take_all(self) -> list[T]:
         """All kept valid messages not taken yet, oldest first."""
         with self._lock:
-            samples = list(self._samples)
+            samples, oversized = list(self._samples), list(self._oversized)
             self._samples.clear()
+            self._oversized.clear()
+        for key, size in oversized:
+            self._reject(key, codec.Malformed(codec.oversize(size, self.topic.max_bytes)))
         decoded = [(at, message) for at, sample in samples if (message := self._decode(sample)) is not None]
         messages = self._young(decoded)
         if messages:
@@ -138,15 +149,18 @@ class Subscription(Generic[T]):
                 self.topic.type, sample.payload.to_bytes(), str(sample.encoding), max_bytes=self.topic.max_bytes
             )
         except codec.CodecError as error:
-            self.rejected += 1
-            self.last_error = str(error)[:500]
-            self.last_error_kind = _KINDS[type(error)]
-            self._report(f"rejected {key}", f"{key}: rejected: {error}")
+            self._reject(key, error)
             return None
         self.last_error_kind = ""
         if isinstance(message, Produced):
             self._hear(key, f"{message.stage}/{message.instance}")
         return message  # type: ignore[return-value]
+
+    def _reject(self, key: str, error: codec.CodecError) -> None:
+        self.rejected += 1
+        self.last_error = str(error)[:500]
+        self.last_error_kind = _KINDS[type(error)]
+        self._report(f"rejected {key}", f"{key}: rejected: {error}")
 
     def _young(self, messages: list[tuple[int, T]]) -> list[T]:
         limit_s = self._max_age_s

@@ -21,6 +21,10 @@ class AliveStages:
         """Names of the stages whose token stands."""
         return {key.split("/")[-2] for key in tuple(self._tokens)}
 
+    def processes(self) -> set[tuple[str, str]]:
+        """(stage, instance) of the processes whose token stands."""
+        return {(key.split("/")[-2], key.split("/")[-1]) for key in tuple(self._tokens)}
+
     def _note(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         if sample.kind == zenoh.SampleKind.PUT:

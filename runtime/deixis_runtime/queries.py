@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -17,6 +18,7 @@ from deixis_schemas.topics import Topic
 from .outputs import oversize
 
 MAX_WAITING = 64
+MAX_WAITING_BYTES = 16 << 20
 # Edits are small and each counts: a registry put POI by POI comes in one burst. Only a flood gets here.
 MAX_EDITS = 10_000
 MAX_EDIT_BYTES = 32 << 20
@@ -62,36 +64,74 @@ class QueryQueue:
         self._report = report
         self._lock = threading.Lock()
         self._waiting: deque[zenoh.Query] = deque()
+        self._crowded_out: deque[zenoh.Query] = deque()
+        self._bytes = 0
+        self._begun: Iterator[None] | None = None
 
     def store(self, query: zenoh.Query) -> None:
-        """Callback of the Zenoh queryable. Past the bound the oldest is lost, which its asker sees as no answer."""
+        """Callback of the Zenoh queryable. Past the bound the oldest is refused or, by a flood, left without answer."""
+        size = _size(query)
         with self._lock:
-            if len(self._waiting) >= MAX_WAITING:
-                self._waiting.popleft()
+            if self._bytes + size > MAX_WAITING_BYTES:
                 self.lost += 1
+                return
+            self._bytes += size
             self._waiting.append(query)
+            if len(self._waiting) > MAX_WAITING:
+                self.lost += 1
+                self._crowded_out.append(self._waiting.popleft())
+            if len(self._crowded_out) > MAX_WAITING:
+                self._bytes -= _size(self._crowded_out.popleft())
         self._wake()
 
-    def answer_all(self) -> None:
-        """Answer everybody who waits; called from the loop."""
-        with self._lock:
-            waiting = list(self._waiting)
-            self._waiting.clear()
-        for query in waiting:
-            self._answer_one(query)
+    def answer_until(self, deadline_s: float) -> bool:
+        """Answer those who wait, until this time of the monotonic clock; called from the loop. Whether more is to be done.
 
-    def _answer_one(self, query: zenoh.Query) -> None:
+        At least one reply is given, however late it is. An answer of many replies may be spread over several calls.
+        """
+        while True:
+            if self._begun is None:
+                query = self._next()
+                if query is None:
+                    return False
+                self._begun = self._answer_one(query)
+            if next(self._begun, self) is self:
+                self._begun = None
+            if time.monotonic() >= deadline_s:
+                with self._lock:
+                    return bool(self._begun or self._waiting or self._crowded_out)
+
+    def _next(self) -> zenoh.Query | None:
+        """Who is to be answered next. Those to be refused are refused first: that takes no time."""
+        with self._lock:
+            crowded_out = list(self._crowded_out)
+            self._crowded_out.clear()
+            query = self._waiting.popleft() if self._waiting else None
+            self._bytes -= sum(_size(taken) for taken in (*crowded_out, query) if taken is not None)
+        for refused in crowded_out:
+            self._refuse(refused, f"busy: more than {MAX_WAITING} gets wait")
+            refused.drop()  # type: ignore[no-untyped-call]
+        return query
+
+    def _answer_one(self, query: zenoh.Query) -> Iterator[None]:
+        """Give the replies one by one."""
         try:
-            try:
-                self._reply(query)
-            except Refused as error:
-                query.reply_err(str(error).encode(), encoding="text/plain")
+            yield from self._replies(query)
+        except Refused as error:
+            self._refuse(query, str(error))
         except zenoh.ZError as error:
-            self._report(f"reply {query.key_expr}", f"{query.key_expr}: cannot reply: {error}")
+            self._report("reply", f"{query.key_expr}: cannot reply: {error}")
         finally:
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _reply(self, query: zenoh.Query) -> None:
+    def _refuse(self, query: zenoh.Query, why: str) -> None:
+        try:
+            query.reply_err(why.encode(), encoding="text/plain")
+        except zenoh.ZError as error:
+            self._report("reply", f"{query.key_expr}: cannot reply: {error}")
+
+    def _replies(self, query: zenoh.Query) -> Iterator[None]:
+        """Give the replies one by one. Raises Refused, zenoh.ZError."""
         parameters = {str(name): str(value) for name, value in dict(query.parameters).items()}  # type: ignore[call-overload]
         wanted = parameters.get("format", "msgpack")
         if wanted not in ("msgpack", "json"):
@@ -107,6 +147,11 @@ class QueryQueue:
                 self._report(f"reply size {key}", what)
                 raise Refused(f"{what}; ask for less, with ?top=N or ?poi=ID")
             query.reply(key, content, encoding=codec.JSON if wanted == "json" else codec.encoding_of(type(message)))
+            yield
+
+
+def _size(query: zenoh.Query) -> int:
+    return len(query.payload) if query.payload is not None else 0
 
 
 class EditQueue:
@@ -133,12 +178,14 @@ class EditQueue:
                 self._bytes += size
         self._wake()
 
-    def take_all(self) -> list[Edit]:
-        """All edits heard since the last call."""
+    def take(self, most: int) -> list[Edit]:
+        """The oldest edits not taken yet, so many at most; the loop is woken again where there are more."""
         with self._lock:
-            samples = list(self._waiting)
-            self._waiting.clear()
-            self._bytes = 0
+            samples = [self._waiting.popleft() for _ in range(min(most, len(self._waiting)))]
+            self._bytes -= sum(len(sample.payload) for sample in samples)
+            more = bool(self._waiting)
+        if more:
+            self._wake()
         if self.lost > self._said:
             self._said = self.lost
             bounds = f"{MAX_EDITS} edits or {MAX_EDIT_BYTES} bytes"

@@ -21,6 +21,7 @@ from .limit import RateLimit
 from .link_security import LinkSecurity, SecurityError, cautions, endpoints, secure
 from .link_watch import LinkWatch
 from .manager import Manager
+from .memory import settle
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE, setup_logging
 
@@ -42,6 +43,8 @@ def router_config(
     config = base_config("router", file)
     settings = {
         "transport/link/tx/lease": LEASE_MS,
+        # It hands on what stages put into shared memory, and lays out 16 MB of its own for nothing.
+        "transport/shared_memory/transport_optimization/enabled": False,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
@@ -105,6 +108,7 @@ def _watch_links(
     session: zenoh.Session, listen: list[str], links: LinkWatch, interrupts: Interrupts, parent: int | None
 ) -> None:
     manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    settle()
     _tell_manager(manager, limit, "routing")
     while not interrupts.wait(CHECK_S):
         if parent is not None and os.getppid() != parent:

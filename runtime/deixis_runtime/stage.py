@@ -26,8 +26,10 @@ from .limit import RateLimit
 from .link_watch import CertificateWatch, say
 from .liveliness import AliveStages
 from .manager import Manager
+from .memory import settle
 from .outputs import Publisher, oversize
 from .queries import Answer, EditQueue, Query, QueryQueue
+from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
 
@@ -38,6 +40,7 @@ EXIT_UNREACHABLE = 69
 IDLE_WAIT_S = 0.25
 # A signal handler may set a plain attribute only (`threading.Event.set` can deadlock in one): `wait` looks this often.
 STOP_POLL_S = 0.1
+ANSWERING_S = 0.01
 MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 
 
@@ -134,6 +137,10 @@ class Node:
         self._clocks.append(watch)
         return watch
 
+    def follow_readers(self, topic: Topic) -> Readers:
+        """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
+        return Readers(self._session, self.robot, topic, self._alive, self._router)
+
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
         return self._alive.stages()
@@ -146,8 +153,10 @@ class Node:
             self._declare_alive()
         self._event.wait(min(timeout_s, self._heartbeat.due_in_s(), STOP_POLL_S))
         self._event.clear()
-        for queue in self._queries:
-            queue.answer_all()
+        # A flood of gets takes this much of each turn, and the stage's own work the rest.
+        answer_until_s = time.monotonic() + ANSWERING_S
+        if any([queue.answer_until(answer_until_s) for queue in self._queries]):  # noqa: C419 - each has its turn
+            self.wake()
         if self._heartbeat.due_in_s() == 0.0:
             self._beat()
         self._tell_manager()
@@ -225,7 +234,7 @@ class Node:
         if self._parent is not None and os.getppid() != self._parent:
             self.log.error("the supervisor is gone; stopping")
             self.stop()
-        if not self._session.info.routers_zid():
+        if not self._router():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
 
     def _tell_manager(self) -> None:
@@ -241,9 +250,14 @@ class Node:
 
     def _record(self) -> Health:
         clocks = [known for watch in self._clocks if (known := watch.health()) is not None]
-        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks)
+        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks, self._router())
+
+    def _router(self) -> str:
+        """Zenoh id of the router we are a client of; empty without one."""
+        return next(map(str, self._session.info.routers_zid()), "")
 
     def _declare_alive(self) -> None:
+        settle()
         # Only now, when all subscribers stand: whoever waits for the token may publish at once.
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
+from .launching import Child, start_process
 from .settings import STARTED_BEFORE
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE
 
@@ -30,7 +31,7 @@ class Process:
 
     name: str
     argv: list[str]
-    popen: subprocess.Popen[bytes] | None = None
+    popen: Child | None = None
     restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
     started: int = 0
     start_again_s: float | None = None
@@ -47,6 +48,7 @@ class Supervisor:
 
     def __init__(self) -> None:
         self.processes: dict[str, Process] = {}
+        self.launch = start_process
 
     def start(self, name: str, argv: list[str]) -> None:
         """Start a child. It gets its own session, so that Ctrl-C reaches the supervisor alone, which stops them in order."""
@@ -95,7 +97,7 @@ class Supervisor:
             process.popen.kill()
             self._await_killed(process.popen, process.name)
 
-    def _await_killed(self, popen: subprocess.Popen[bytes], name: str) -> None:
+    def _await_killed(self, popen: Child, name: str) -> None:
         try:
             popen.wait(KILL_TIMEOUT_S)
         except subprocess.TimeoutExpired:  # within a system call that does not return, as of a broken device
@@ -106,14 +108,15 @@ class Supervisor:
         environment = {**os.environ, STARTED_BEFORE: str(process.started)}
         process.started += 1
         try:
-            process.popen = subprocess.Popen(process.argv, stdin=subprocess.DEVNULL, start_new_session=True, env=environment)
+            process.popen = self.launch(process.argv, environment)
         except OSError as error:
             process.given_up = f"it cannot be started: {error.strerror}"
             log.error("%s is given up: %s", process.name, process.given_up)
 
     def _plan_restart(self, process: Process) -> None:
         assert process.popen is not None
-        status, now = process.popen.returncode, time.monotonic()
+        status, now = process.popen.poll(), time.monotonic()
+        assert status is not None
         if status == EXIT_CONFIG:
             process.given_up = "its settings are wrong"
         elif len(process.restarts) == RESTART_LIMIT and now - process.restarts[0] < RESTART_WINDOW_S:

@@ -59,10 +59,15 @@ def decode(type_: type[T], payload: bytes, encoding: str, *, max_bytes: int = 1 
     return validate(type_, unpack(payload, max_bytes=max_bytes))
 
 
+def oversize(size: int, max_bytes: int) -> str:
+    """That a payload is too large, in words."""
+    return f"{size} bytes, more than the {max_bytes} allowed"
+
+
 def unpack(payload: bytes, *, max_bytes: int = 1 << 20) -> dict[str, Any]:
     """The msgpack map in `payload`, not validated. Raises Malformed."""
     if len(payload) > max_bytes:
-        raise Malformed(f"{len(payload)} bytes, more than the {max_bytes} allowed")
+        raise Malformed(oversize(len(payload), max_bytes))
     try:
         content = msgpack.unpackb(payload, raw=False)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
@@ -81,7 +86,7 @@ def decode_json(type_: type[T], text: bytes | str) -> T:
 def parse_json(text: bytes | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any]:
     """The JSON object in `text`, not validated. Raises Malformed."""
     if len(text) > max_bytes:
-        raise Malformed(f"{len(text)} bytes, more than the {max_bytes} allowed")
+        raise Malformed(oversize(len(text), max_bytes))
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:

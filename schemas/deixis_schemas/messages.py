@@ -593,6 +593,11 @@ class Health(Produced):
     reason: Text = Field(default="", description="Why it is not ok, as one sentence.")
     pid: Count
     host: Text
+    router: Text = Field(
+        default="",
+        description="Zenoh id of the router that the stage is a client of: those with the same one share a host, whatever its "
+        "name. Empty where it is not told, or no router is there.",
+    )
     uptime_s: float = Field(ge=0)
     cpu_s: float = Field(ge=0, description="Processor time used since the start, user and system.")
     rss_mb: float = Field(ge=0)

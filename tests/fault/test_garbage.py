@@ -3,7 +3,9 @@
 import json
 import os
 import random
+import subprocess
 
+import flooding
 import msgpack
 import pytest
 import zenoh
@@ -20,13 +22,19 @@ HEARD_BY = {  # the keys that stages listen to, and one stage that hears each
     "headpose/poses": "fusion",
     "gesture/gestures": "fusion",
     "robot/pose": "fusion",
+    "fusion/belief": "camera",
 }
+EVERY_KEY = [topic.key(ROBOT, stage=stage, id="garbage") for topic in topics.TOPICS for stage in topics.STAGES]
+QUERYABLE = [topic.key(ROBOT, stage="tracker", id="garbage") for topic in topics.TOPICS if topic.queryable]
+FLOOD = 100_000
+FLOOD_OF_GETS = 2_000
 FRAME = Frame(stamp_ns=1, stage="camera", instance="x", run=1, seq=1, width=1, height=1, encoding="bgr8", data=b"abc")
 NAN = float("nan")
 NOT_NUMBERS = {  # a field of each type; the others ignore what they do not know
     "width": float("inf"),
     "x_m": NAN,
     "position_m": [NAN] * 3,
+    "persons": [{"person_id": 0, "unknown": NAN}],
     "poses": [{"person_id": 0, "status": "tracking", "yaw_deg": NAN, "yaw_sigma_deg": 3.0}],
     "gestures": [{"person_id": 0, "phase": "stroke", "gesture": "none", "bearing_deg": NAN, "bearing_sigma_deg": 3.0}],
 }
@@ -125,6 +133,41 @@ def test_a_lens_that_cannot_be_is_counted_by_those_who_read_it_and_named_in_the_
         running.wait_until(lambda stage=stage: running.health(stage)["counters"].get("lenses_refused"), f"{stage} to count it")
     said = f"{running.key('camera/info')}: not used: camera/x: camera_matrix: a focal length of 1 pixels"
     running.wait_until(lambda: running.log.read_text().count(said) == len(readers), "each to say it")
+
+
+def test_these_are_all_keys_that_stages_listen_to(running):
+    heard = {item["key"] for stage in topics.STAGES for item in running.health(stage)["inputs"]}
+    assert heard == {running.key(path) for path in HEARD_BY}
+
+
+def flood(running, what, count, keys):
+    argv = flooding.command(running.endpoint, what, count, *keys)
+    done = subprocess.run(argv, capture_output=True, text=True, timeout=240, check=True)
+    return json.loads(done.stdout)
+
+
+def test_a_hundred_thousand_payloads_of_garbage_on_all_keys_leave_memory_as_it_is_and_a_few_lines_in_the_log(running):
+    before_mb = {stage: running.health(stage)["rss_mb"] for stage in topics.STAGES}
+    pois, rejected = running.state()["pois"], running.state()["edits_rejected"]
+    lines = len(running.log.read_text().splitlines())
+    assert flood(running, "garbage", FLOOD, dict.fromkeys(EVERY_KEY)) == {"sent": FLOOD}
+    state = running.wait_until(
+        lambda: (state := running.state()).get("edits_rejected", 0) > rejected + 1000 and state, "refusals"
+    )
+    assert state["pois"] == pois
+    for stage in topics.STAGES:
+        running.wait_until(lambda stage=stage: running.health(stage), f"health of {stage}")
+        assert running.health(stage)["rss_mb"] < before_mb[stage] + 15, stage
+    said = [line for line in running.log.read_text().splitlines()[lines:] if "WARNING" in line]
+    assert len(said) < 200, "said by key and cause, at intervals"
+
+
+def test_thousands_of_gets_with_garbage_are_answered_or_refused_and_change_nothing(running):
+    before = running.state()["pois"]
+    became = flood(running, "garbage_gets", FLOOD_OF_GETS, QUERYABLE)
+    assert sum(became.values()) == FLOOD_OF_GETS
+    assert "timed out" not in became
+    assert running.state()["pois"] == before
 
 
 def test_afterwards_all_stages_still_run_and_the_poi_is_named(running):

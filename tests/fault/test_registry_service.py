@@ -2,173 +2,31 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import random
 import signal
-import socket
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-import zenoh
-from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import (
-    Belief,
-    CameraInfo,
-    Gestures,
-    HeadPoses,
-    Health,
-    Message,
-    Poi,
-    RobotPose,
-    State,
-    Target,
-    Track,
-    Tracks,
-)
-
-PATIENCE_S = 20.0
-K = [560.0, 0.0, 319.5, 0.0, 560.0, 239.5, 0.0, 0.0, 1.0]
-
-
-def wait_until(condition: Callable[[], Any], what: str) -> Any:
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        if value := condition():
-            return value
-        assert time.monotonic() < deadline, f"{what} did not come within {PATIENCE_S:g} s"
-        time.sleep(0.02)
+from deixis_schemas.messages import HeadPoses, Poi, RobotPose
+from fusion_bench import Bench, camera_info, fusion_bench, of_frame, router, show, source, wait_until
 
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
     """Endpoint of a router on loopback."""
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        name = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
-    router = subprocess.Popen([sys.executable, "-m", "deixis_runtime.router", "--listen", name], stderr=subprocess.DEVNULL)
-    try:
-        wait_until(lambda: _answers(name), "the router")
-        yield name
-    finally:
-        router.terminate()
-        router.wait(10)
-
-
-def _answers(endpoint: str) -> bool:
-    with contextlib.suppress(ConnectionError), open_client(endpoint, shared_memory=False):
-        return True
-    return False
-
-
-class Bench:
-    """A robot's keys with nothing but fusion on them; the test plays the other stages."""
-
-    def __init__(self, session: zenoh.Session, endpoint: str, robot: str, registry: Path | None) -> None:
-        self.session = session
-        self.endpoint = endpoint
-        self.robot = robot
-        self.registry = registry
-        self.beliefs: list[Belief] = []
-        self.targets: list[Target] = []
-        self.process: subprocess.Popen[str] | None = None
-        self._lock = threading.Lock()
-        self._declared = [
-            session.declare_subscriber(topics.BELIEF.key(robot), lambda s: self._keep(self.beliefs, Belief, s)),
-            session.declare_subscriber(topics.TARGET.key(robot), lambda s: self._keep(self.targets, Target, s)),
-        ]
-
-    def _keep(self, heard: list[Any], type_: type[Message], sample: zenoh.Sample) -> None:
-        with self._lock:
-            heard.append(codec.decode(type_, sample.payload.to_bytes(), str(sample.encoding)))
-
-    def command(self, *more: str) -> list[str]:
-        sets = ["--set", f"registry={self.registry}", *more] if self.registry else [*more]
-        return [sys.executable, "-c", "import sys; from deixis_fusion.service import main; sys.exit(main())",
-                "--robot", self.robot, "--connect", self.endpoint, *sets]  # fmt: skip
-
-    def start(self, *more: str) -> None:
-        self.process = subprocess.Popen(self.command(*more), stderr=subprocess.DEVNULL, text=True)
-        wait_until(lambda: self.replies("fusion/state"), "fusion's state")
-
-    def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
-        assert self.process is not None
-        self.process.send_signal(how)
-        return self.process.wait(15)
-
-    def replies(self, path: str, payload: bytes | None = None, encoding: str | None = None) -> list[zenoh.Reply]:
-        selector = f"deixis/{self.robot}/{path}"
-        return list(self.session.get(selector, payload=payload, encoding=encoding, timeout=5.0))
-
-    def ask(self, path: str, payload: dict[str, Any] | None = None) -> tuple[str, str] | None:
-        """("ok" or "refused", text) of the one reply to an edit; none where nobody answers on that key."""
-        body = json.dumps(payload).encode() if payload is not None else None
-        replies = self.replies(path, body, "application/json" if body else None)
-        if not replies:
-            return None
-        (reply,) = replies
-        if reply.ok is not None:
-            return "ok", str(codec.decode_any(reply.ok.payload.to_bytes(), str(reply.ok.encoding)))
-        assert reply.err is not None
-        return "refused", reply.err.payload.to_string()
-
-    def state(self, selector: str = "") -> State:
-        (reply,) = wait_until(lambda: self.replies(f"fusion/state{selector}"), "fusion's state")
-        assert reply.ok is not None
-        return codec.decode(State, reply.ok.payload.to_bytes(), str(reply.ok.encoding), max_bytes=topics.STATE.max_bytes)
-
-    def put(self, topic: topics.Topic, message: Message) -> None:
-        self.session.put(topic.key(self.robot), codec.encode(message), encoding=codec.encoding_of(type(message)))
+    with router() as it:
+        yield it
 
 
 @pytest.fixture
 def bench(endpoint: str, tmp_path: Path) -> Iterator[Bench]:
-    with open_client(endpoint, shared_memory=False) as session:
-        made = Bench(session, endpoint, f"t-{os.getpid()}-{random.randrange(10**9)}", tmp_path / "pois.sqlite")
-        yield made
-        if made.process is not None and made.process.poll() is None:
-            made.process.kill()
-            made.process.wait(10)
-
-
-def source(status: str, stage: str) -> Callable[[State], bool]:
-    return lambda state: any(s.stage == stage and s.status == status for s in state.sources)
-
-
-def camera_info(state: str = "streaming", last_seq: int = -1) -> CameraInfo:
-    content = {"stamp_ns": 0, "stage": "camera", "instance": "c", "state": state, "source": "test", "width": 640, "height": 480}
-    content["run"] = 1
-    return CameraInfo.model_validate(content | {"camera_matrix": K, "last_seq": last_seq})
-
-
-def of_frame(stage: str, seq: int, stamp_ns: int) -> dict[str, Any]:
-    return {"run": 1, "seq": seq, "stamp_ns": stamp_ns, "stage": stage, "instance": "x"}
-
-
-def face() -> Track:
-    return Track.model_validate(
-        {"track_id": 1, "person_id": 1, "kind": "face", "kind_probabilities": {"face": 1}, "centroid_px": (320, 240)}
-        | {"bbox_px": (297, 210, 46, 60), "velocity_px_s": (0, 0)}
-    )
-
-
-def show(bench: Bench, seq: int, *, head: bool = True) -> None:
-    """One frame of a person who points left and looks there, 2 m ahead."""
-    now_ns = time.time_ns()
-    bench.put(topics.TRACKS, Tracks(**of_frame("tracker", seq, now_ns), width=640, height=480, tracks=[face()]))
-    pose = {"person_id": 1, "status": "tracking", "yaw_deg": 60.0, "yaw_sigma_deg": 3.0}
-    if head:
-        bench.put(topics.HEAD_POSES, HeadPoses.model_validate(of_frame("headpose", seq, now_ns) | {"poses": [pose]}))
-    hand = {"person_id": 1, "phase": "stroke", "gesture": "point_left", "bearing_deg": 60.0, "bearing_sigma_deg": 10.0}
-    bench.put(topics.GESTURES, Gestures.model_validate(of_frame("gesture", seq, now_ns) | {"gestures": [hand]}))
-    wait_until(lambda: bench.beliefs and bench.beliefs[-1].seq == seq, f"the belief of frame {seq}")
+    with fusion_bench(endpoint, tmp_path) as it:
+        yield it
 
 
 def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(bench: Bench) -> None:
@@ -201,9 +59,7 @@ def test_a_corrupt_registry_is_set_aside_said_so_and_its_last_good_copy_used(ben
     bench.registry.write_bytes(b"damaged " * 4000)
     bench.start()
     assert [(poi.poi_id, poi.edited_by) for poi in bench.state().pois] == [("vase", "anna")]
-    (reply,) = bench.replies("fusion/health")
-    assert reply.ok is not None
-    notes = codec.decode(Health, reply.ok.payload.to_bytes(), str(reply.ok.encoding)).notes
+    notes = bench.health().notes
     assert any("is corrupt" in note and "pois.sqlite.corrupt-1" in note and "1 POIs of" in note for note in notes)
     assert bench.stop() == 0
 
@@ -293,20 +149,18 @@ def test_an_old_pose_of_the_robot_is_said_in_state_and_health(bench: Bench) -> N
     wait_until(lambda: source("ok", "robot")(bench.state()) and bench.state().sources[-1].received == 2, "the old pose")
     show(bench, 2)
     wait_until(lambda: source("late", "robot")(bench.state()), "an old pose in the state")
-    (reply,) = bench.replies("fusion/health")
-    assert reply.ok is not None
-    health = codec.decode(Health, reply.ok.payload.to_bytes(), str(reply.ok.encoding))
-    assert any("s older than the frame" in note for note in health.notes)
+    assert any("s older than the frame" in note for note in bench.health().notes)
     assert bench.beliefs[-1].persons[0].evidence[2].source == "robot"
 
 
 def test_a_stage_that_is_killed_leaves_no_folder_behind(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    (temporary := tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
     bench.registry = None
     bench.start()
     assert bench.state().registry_path == ":memory:"
     bench.stop(signal.SIGKILL)
-    assert list(tmp_path.iterdir()) == []
+    assert list(temporary.iterdir()) == []
 
 
 def test_two_stages_on_one_registry_file_the_second_exits_with_one_clear_error(bench: Bench) -> None:

@@ -130,7 +130,7 @@ def test_a_stopped_stage_is_noticed_and_replaced(lasting_up):
 
 def test_sigterm_ends_all_children_in_good_order_within_five_seconds(up):
     started = children(up.child.pid)
-    assert len(started) == 3, "router, fusion, camera"
+    assert len(started) == 4, "the process that forks, router, fusion, camera"
     up.child.send_signal(signal.SIGTERM)
     assert up.child.wait(5) == 0
     assert not [pid for pid in started if runs(pid)]
@@ -138,7 +138,7 @@ def test_sigterm_ends_all_children_in_good_order_within_five_seconds(up):
 
 def test_a_killed_supervisor_leaves_no_orphan_after_three_seconds(up, wait_for):
     started = children(up.child.pid)
-    assert len(started) == 3, "router, fusion, camera"
+    assert len(started) == 4, "the process that forks, router, fusion, camera"
     up.child.kill()
     wait_for(lambda: not [pid for pid in started if runs(pid)], "all children are gone", 3.0)
 

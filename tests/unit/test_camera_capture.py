@@ -14,6 +14,7 @@ from deixis_camera.calibration import AssumedFieldOfView, Calibration, RosCalibr
 from deixis_camera.capture import BAD_PICTURES, Capture
 from deixis_camera.config import CameraConfig
 from deixis_camera.handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
+from deixis_camera.ladder import Rung
 from deixis_camera.pictures import Encoded
 from deixis_camera.sources import Picture, SourceLost
 
@@ -58,6 +59,7 @@ def run(
     until: Callable[[Item], bool],
     calibration: Calibration | None = None,
     lockstep: bool = False,
+    quality: int | None = None,
 ) -> list[Item]:
     """What the thread hands over, up to the first item that `until` accepts."""
     handoff, found = Handoff(), list[Item]()
@@ -66,6 +68,7 @@ def run(
         calibration or AssumedFieldOfView(60.0),
         handoff,
         FIRST_RUN,
+        rung=lambda: Rung(quality, config.rate_hz or 0.0),
         lockstep=lockstep,
         wake=lambda: None,
         log=logging.getLogger("test"),

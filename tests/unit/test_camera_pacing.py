@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 MS = 1_000_000
 
 
-@pytest.mark.parametrize(("limit_hz", "share"), [(None, 1.0), (30.0, 1.0), (60.0, 1.0), (15, 1 / 2), (10, 1 / 3), (20, 2 / 3)])
-def test_a_rate_limit_leaves_out_pictures_evenly(limit_hz: float | None, share: float) -> None:
+@pytest.mark.parametrize(("limit_hz", "share"), [(0.0, 1.0), (30.0, 1.0), (60.0, 1.0), (15, 1 / 2), (10, 1 / 3), (20, 2 / 3)])
+def test_a_rate_limit_leaves_out_pictures_evenly(limit_hz: float, share: float) -> None:
     limit = RateLimit(limit_hz)
     passed = [i for i in range(300) if limit.lets(round(i * 1e9 / 30))]
     assert len(passed) == pytest.approx(300 * share, abs=2)
@@ -35,6 +35,16 @@ def test_a_rate_limit_never_passes_more_than_its_rate(gaps_ms: list[int], limit_
             passed.append(now)
     longest = (passed[-1] - passed[0]) / 1e9 if passed else 0.0
     assert len(passed) <= longest * limit_hz / 0.9 + 2
+
+
+def test_a_rate_limit_that_is_changed_holds_from_the_next_picture_on() -> None:
+    limit, passed = RateLimit(30.0), []
+    for i in range(90):
+        if i == 30:
+            limit.limit(10.0)
+        passed += [i] if limit.lets(round(i * 1e9 / 30)) else []
+    assert passed[:30] == list(range(30))
+    assert passed[30:] == list(range(passed[30], 90, 3))
 
 
 def test_a_clock_that_steps_back_does_not_stop_the_pictures() -> None:

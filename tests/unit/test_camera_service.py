@@ -8,10 +8,12 @@ import pytest
 from deixis_camera.calibration import AssumedFieldOfView
 from deixis_camera.config import CameraConfig
 from deixis_camera.handoff import Became, Opened, Ready
+from deixis_camera.ladder import Rung
+from deixis_camera.link_control import LinkControl
 from deixis_camera.pictures import Encoded
 from deixis_camera.service import CameraStage, first_run
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Frame, Message, Producer
+from deixis_schemas.messages import CameraInfo, Frame, Gestures, Message, Producer
 from deixis_schemas.topics import Topic
 
 MS = 1_000_000
@@ -29,6 +31,34 @@ class FakePublisher:
         self.sent.append(message)
 
 
+class FakeReaders:
+    """Who reads frames elsewhere, as set by hand."""
+
+    def __init__(self) -> None:
+        self.hosts: set[str] = set()
+        self.new: set[tuple[str, str]] = set()
+
+    def turn(self) -> None:
+        pass
+
+    def elsewhere(self) -> set[str]:
+        return self.hosts
+
+    def unsettled(self) -> set[tuple[str, str]]:
+        return self.new
+
+
+class FakeInput:
+    """Messages that were heard, put there by hand."""
+
+    def __init__(self) -> None:
+        self.heard: list[Message] = []
+
+    def take_all(self) -> list[Message]:
+        heard, self.heard = self.heard, []
+        return heard
+
+
 class FakeNode:
     """Stands in for the runtime's Node; its two clocks are set by hand."""
 
@@ -43,9 +73,21 @@ class FakeNode:
         self.monotonic_ns = 3_000 * MS
         self.counters: dict[str, int] = {}
         self.outputs: dict[str, FakePublisher] = {}
+        self.inputs: dict[str, FakeInput] = {}
+        self.readers = FakeReaders()
+        self.notes: dict[str, str | None] = {}
 
     def publish(self, topic: Topic) -> FakePublisher:
         return self.outputs.setdefault(topic.path, FakePublisher())
+
+    def subscribe(self, topic: Topic, _depth: int = 1) -> FakeInput:
+        return self.inputs.setdefault(topic.path, FakeInput())
+
+    def follow_readers(self, _topic: Topic) -> FakeReaders:
+        return self.readers
+
+    def note(self, key: str, text: str | None) -> None:
+        self.notes[key] = text
 
     def now_ns(self) -> int:
         return self.wall_ns
@@ -63,7 +105,7 @@ class FakeNode:
     def serve_get(self, *_: object) -> None:
         pass
 
-    note = warn = set_state = serve_get
+    warn = set_state = serve_get
 
     def pass_ms(self, passed_ms: int) -> None:
         """Let time pass on both clocks."""
@@ -189,3 +231,87 @@ def test_a_live_camera_that_falls_silent_is_said_to_stall_by_the_monotonic_clock
 @pytest.mark.parametrize(("lockstep", "started_before", "run"), [(False, 2, NOON_NS // MS), (True, 0, 0), (True, 2, 2 << 32)])
 def test_the_first_run_tells_one_start_from_another(lockstep: bool, started_before: int, run: int) -> None:
     assert first_run(FakeNode(lockstep=lockstep, started_before=started_before)) == run  # type: ignore[arg-type]
+
+
+def answer(node: FakeNode, frame: Frame) -> None:
+    """The gesture stage answers the frame."""
+    node.inputs[topics.GESTURES.path].heard.append(Gestures.derive(frame, Producer("gesture", "g")))
+
+
+def play_live(node: FakeNode, stage: CameraStage, seconds: float, first_seq: int = 0, *, answered: bool) -> None:
+    """A live source of 20 Hz, whose frames are answered after 50 ms or not at all."""
+    for seq in range(first_seq, first_seq + round(20 * seconds)):
+        waiting = node.frames[-1] if node.frames else None
+        if answered and waiting is not None:
+            answer(node, waiting)
+        stage.handoff.put_live(ready(7, seq, node.monotonic_ns))
+        stage.step()
+        node.pass_ms(50)
+
+
+def test_on_one_host_nothing_is_adapted_and_nobody_is_listened_to() -> None:
+    node = FakeNode()
+    stage = stage_on(node)
+    stage.handoff.report(Opened(True, 20.0))
+    play_live(node, stage, 5.0, answered=False)
+    assert len(node.frames) == 100
+    assert node.inputs == {}
+    assert node.notes.get("link") is None
+
+
+def test_frames_that_another_host_does_not_answer_are_held_back_and_that_is_counted_and_said() -> None:
+    node = FakeNode()
+    node.readers.hosts = {"edge"}
+    stage = stage_on(node)
+    stage.handoff.report(Opened(True, 20.0))
+    play_live(node, stage, 5.0, answered=False)
+    assert 10 <= len(node.frames) <= 25
+    assert node.counters["pictures_held_back"] == 100 - len(node.frames)
+    said = node.notes["link"]
+    assert said is not None
+    assert said.startswith("sends JPEGs of quality 50 at up to 5/s to edge: no answer")
+
+
+def test_frames_that_another_host_answers_in_time_all_go_out() -> None:
+    node = FakeNode()
+    node.readers.hosts = {"edge"}
+    stage = stage_on(node)
+    stage.handoff.report(Opened(True, 20.0))
+    play_live(node, stage, 5.0, answered=True)
+    assert len(node.frames) == 100
+    assert node.notes["link"] == (
+        "sends JPEGs of quality 85 at up to 20/s to edge: 82 kB/s arrive, answered after 50 ms (at the quickest 50 ms)"
+    )
+
+
+def test_what_adapts_not_by_its_settings_sends_all() -> None:
+    node = FakeNode()
+    node.readers.hosts = {"edge"}
+    stage = stage_on(node, adapt=False, quality=70)
+    stage.handoff.report(Opened(True, 20.0))
+    play_live(node, stage, 5.0, answered=False)
+    assert len(node.frames) == 100
+    assert (
+        node.notes["link"] == "sends JPEGs of quality 70 at the source's rate to edge: not adapted to the link (camera.adapt)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("encoding", "hosts", "quality"),
+    [("auto", set(), None), ("auto", {"edge"}, 50), ("bgr8", {"edge"}, None), ("jpeg", set(), 85), ("jpeg", {"edge"}, 50)],
+)
+def test_pictures_are_raw_on_one_host_and_jpegs_between_two(encoding: str, hosts: set[str], quality: int | None) -> None:
+    node = FakeNode()
+    node.readers.hosts = hosts
+    link = LinkControl(node, CameraConfig.model_validate({"encoding": encoding}))  # type: ignore[arg-type]
+    link.turn(node.monotonic_s())
+    assert link.rung.quality == quality, "the lowest rung to begin with, where it adapts"
+
+
+def test_lockstep_never_adapts() -> None:
+    node = FakeNode(lockstep=True)
+    node.readers.hosts = {"edge"}
+    link = LinkControl(node, CameraConfig.model_validate({}))  # type: ignore[arg-type]
+    link.turn(node.monotonic_s())
+    assert link.settled()
+    assert link.rung == Rung(None, 0.0)

@@ -9,7 +9,7 @@ import deixis_runtime
 import pytest
 from deixis_cli import main as command_line
 
-COMMANDS = {"certs", "run", "up", "status", "watch", "doctor", "poi"}
+COMMANDS = {"run", "up", "status", "watch", "certs", "doctor", "poi", "record", "replay"}
 
 
 def entry(name, register):

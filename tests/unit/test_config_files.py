@@ -1,10 +1,12 @@
 """The Zenoh settings and the site that ship load as they are."""
 
 import json
+import re
 import shutil
 import subprocess
 
 import pytest
+from deixis_runtime.environment import ENVIRONMENT
 from deixis_runtime.router import router_config
 from deixis_runtime.site import load_site
 from running import ROOT
@@ -19,6 +21,7 @@ def test_our_router_takes_the_settings_and_the_endpoints_of_the_command_line(pat
     assert json.loads(config.get_json("mode")) == "router"
     assert json.loads(config.get_json("transport/link/tx/lease")) == 2000
     assert json.loads(config.get_json("scouting/multicast/enabled")) is False
+    assert json.loads(config.get_json("transport/shared_memory/transport_optimization/enabled")) is False
     assert json.loads(config.get_json("listen/endpoints")) == ["tcp/127.0.0.1:1"]
     assert json.loads(config.get_json("connect/endpoints")) == ["tcp/127.0.0.1:2"]
 
@@ -36,3 +39,10 @@ def test_the_example_sites_load(path):
     site = load_site(path)
     assert site.pois
     assert site.walls
+
+
+@pytest.mark.parametrize("path", ["Dockerfile", "systemd/deixis@.service"])
+def test_all_ways_of_starting_a_stage_set_the_same_environment(path):
+    text = (ROOT / path).read_text()
+    for name, value in ENVIRONMENT.items():
+        assert re.search(rf"(^| |=){name}={value}( |$)", text, re.MULTILINE), name

@@ -1,9 +1,12 @@
 """Edits and gets that wait for the loop are bounded, and what is lost is counted; steps are those of the last second."""
 
 import threading
+import time
+import weakref
 from types import SimpleNamespace
 
 import pytest
+import zenoh
 from deixis_runtime import inputs, queries
 from deixis_runtime.heartbeat import StepTimes
 from deixis_runtime.inputs import Subscription
@@ -12,6 +15,8 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import Poi, State
 from deixis_schemas.samples import FRAME
 from zenoh import Parameters, SampleKind, ZBytes
+
+POI = Poi(poi_id="a", position_m=(1, 2, 3))
 
 
 class Log:
@@ -42,7 +47,7 @@ def test_a_burst_of_edits_is_kept_whole_and_in_its_order(log):
     queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(5000):
         queue.store(put(number))
-    assert [int(edit.payload) for edit in queue.take_all()] == list(range(5000))
+    assert [int(edit.payload) for edit in queue.take(queries.MAX_EDITS)] == list(range(5000))
     assert (queue.lost, log.said) == (0, [])
 
 
@@ -51,10 +56,10 @@ def test_past_the_bound_the_newest_edits_are_lost_counted_and_said_once(log, mon
     queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(103):
         queue.store(put(number))
-    assert [int(edit.payload) for edit in queue.take_all()] == list(range(100))
+    assert [int(edit.payload) for edit in queue.take(queries.MAX_EDITS)] == list(range(100))
     assert queue.lost == 3
     queue.store(put(7))
-    assert len(queue.take_all()) == 1, "there is room again"
+    assert len(queue.take(queries.MAX_EDITS)) == 1, "there is room again"
     assert len(log.said) == 1
     assert "deixis/r1/fusion/poi/**: 3 edits lost" in log.said[0]
 
@@ -63,10 +68,10 @@ def test_edits_are_bounded_by_their_bytes_too(log):
     queue = EditQueue("deixis/r1/fusion/poi/**", no_wake, log)
     for number in range(40):
         queue.store(put(number, size=1 << 20))
-    assert len(queue.take_all()) == 32
+    assert len(queue.take(queries.MAX_EDITS)) == 32
     assert queue.lost == 8
     queue.store(put(1, size=1 << 20))
-    assert len(queue.take_all()) == 1
+    assert len(queue.take(queries.MAX_EDITS)) == 1
 
 
 class Asked:
@@ -91,7 +96,7 @@ def answered(topic, message, log, parameters=""):
     queue = QueryQueue(topic, lambda _: [("deixis/r1/fusion/state", message)], no_wake, log)
     asked = Asked(parameters)
     queue.store(asked)
-    queue.answer_all()
+    assert not queue.answer_until(time.monotonic() + 5)
     assert asked.dropped
     return asked
 
@@ -122,6 +127,75 @@ def test_gets_past_the_bound_are_counted(log):
     for _ in range(queries.MAX_WAITING + 2):
         queue.store(Asked())
     assert queue.lost == 2
+
+
+def test_gets_that_crowded_others_out_are_answered_and_the_others_refused_in_words(log):
+    queue = QueryQueue(topics.POI, lambda _: [("deixis/r1/fusion/poi/a", POI)], no_wake, log)
+    asked = [Asked() for _ in range(queries.MAX_WAITING + 3)]
+    for one in asked:
+        queue.store(one)
+    assert not queue.answer_until(time.monotonic() + 5)
+    assert [one.errors for one in asked[:3]] == [[f"busy: more than {queries.MAX_WAITING} gets wait"]] * 3
+    assert all(len(one.replies) == 1 for one in asked[3:])
+    assert all(one.dropped for one in asked)
+
+
+def test_past_its_time_one_reply_is_given_and_the_rest_when_it_is_called_again(log):
+    keys = [f"deixis/r1/fusion/poi/p{number}" for number in range(3)]
+    queue = QueryQueue(topics.POI, lambda _: [(key, POI) for key in keys], no_wake, log)
+    first, second = Asked(), Asked()
+    queue.store(first)
+    queue.store(second)
+    for replies in (1, 2, 3):
+        assert queue.answer_until(0.0), "there is more to do"
+        assert (len(first.replies), first.dropped) == (replies, False)
+    while queue.answer_until(0.0):
+        pass
+    assert [key for key, *_ in first.replies] == [key for key, *_ in second.replies] == keys
+    assert first.dropped
+    assert second.dropped
+
+
+def test_an_asker_that_cannot_be_reached_is_said_and_does_not_stop_the_next(log):
+    def gone(*_, **__):
+        raise zenoh.ZError("the asker is gone")
+
+    queue = QueryQueue(topics.POI, lambda _: [("deixis/r1/fusion/poi/a", POI)] * 2, no_wake, log)
+    first, second = Asked(), Asked()
+    first.reply = gone
+    queue.store(first)
+    queue.store(second)
+    assert not queue.answer_until(time.monotonic() + 5)
+    assert (first.dropped, len(second.replies)) == (True, 2)
+    assert log.said == ["deixis/r1/fusion/state: cannot reply: the asker is gone"]
+
+
+def test_what_gets_bring_along_is_bounded_by_its_bytes(log):
+    queue = QueryQueue(topics.POI, lambda _: [], no_wake, log)
+    asked = [Asked() for _ in range(20)]
+    for one in asked:
+        one.payload = ZBytes(bytes(1 << 20))
+        queue.store(one)
+    assert queue.lost == 4
+    queue.answer_until(time.monotonic() + 5)
+    assert sum("payload: 1048576 bytes" in "".join(one.errors) for one in asked) == 16
+    late = Asked()
+    late.payload = ZBytes(bytes(10))
+    queue.store(late)
+    assert not queue.answer_until(time.monotonic() + 5)
+    assert (queue.lost, late.dropped) == (4, True), "there is room again"
+
+
+def test_of_many_edits_so_many_are_taken_at_once_in_their_order_and_the_loop_is_woken_for_the_rest(log):
+    woken = []
+    queue = EditQueue("deixis/r1/fusion/poi/**", lambda: woken.append(True), log)
+    for number in range(5):
+        queue.store(put(number))
+    woken.clear()
+    assert [int(edit.payload) for edit in queue.take(3)] == [0, 1, 2]
+    assert len(woken) == 1
+    assert [int(edit.payload) for edit in queue.take(3)] == [3, 4]
+    assert len(woken) == 1
 
 
 def frame_sample(seq, stamp_ns):
@@ -196,6 +270,23 @@ def test_in_lockstep_no_age_is_judged(log, clock):
     assert len(frames.take_all()) == 3
 
 
+def test_what_is_larger_than_its_topic_allows_is_refused_and_not_kept(log):
+    tracks = Subscription(topics.TRACKS, topics.TRACKS.key("r1"), 8, no_wake, log)
+
+    class Large(SimpleNamespace):
+        """Can be watched for being kept."""
+
+    kept = Large(key_expr=tracks.key, payload=ZBytes(bytes(topics.TRACKS.max_bytes + 1)))
+    still_there = weakref.ref(kept)
+    tracks.store(kept)
+    del kept
+    assert still_there() is None
+    assert tracks.take_all() == []
+    assert (tracks.received, tracks.rejected) == (1, 1)
+    assert tracks.health().last_error == "1048577 bytes, more than the 1048576 allowed"
+    assert log.said == ["deixis/r1/tracker/tracks: rejected: 1048577 bytes, more than the 1048576 allowed"]
+
+
 def test_step_times_are_those_of_the_last_second():
     steps = StepTimes()
     for turn in range(300):
@@ -210,6 +301,6 @@ def test_queues_may_be_filled_while_they_are_emptied(log):
     writer = threading.Thread(target=lambda: [queue.store(put(number)) for number in range(3000)])
     writer.start()
     while writer.is_alive():
-        heard += queue.take_all()
-    heard += queue.take_all()
+        heard += queue.take(queries.MAX_EDITS)
+    heard += queue.take(queries.MAX_EDITS)
     assert [int(edit.payload) for edit in heard] == list(range(3000))

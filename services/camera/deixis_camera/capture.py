@@ -15,6 +15,7 @@ from .devices import Device
 from .diagnosis import refuse_unreadable
 from .folders import Pictures, is_picture
 from .handoff import Became, Handoff, Noted, Opened, Ready, Refused
+from .ladder import Rung
 from .pacing import Backoff, RateLimit, period_ns
 from .pictures import Preparation
 from .sources import (
@@ -58,7 +59,8 @@ def source_for(config: CameraConfig) -> Source:
 class Capture(threading.Thread):
     """Reads `config.source` into `handoff`, and calls `wake` after each thing put there.
 
-    Runs are numbered from `first_run`: each pass through a recording is one; a live source that comes back goes on in its own.
+    How each picture is made is what `rung` says then. Runs are numbered from `first_run`: each pass through a recording is one;
+    a live source that comes back goes on in its own.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Capture(threading.Thread):
         handoff: Handoff,
         first_run: int,
         *,
+        rung: Callable[[], Rung],
         lockstep: bool,
         wake: Callable[[], None],
         log: logging.Logger,
@@ -75,12 +78,13 @@ class Capture(threading.Thread):
         super().__init__(name=THREAD_NAME, daemon=True)
         self._config = config
         self._handoff = handoff
+        self._rung = rung
         self._lockstep = lockstep
         self._wake = wake
         self._log = log
         self._stopped = threading.Event()
         self._preparation = Preparation(config, calibration, lambda key, text: self._report(Noted(key, text)))
-        self._rate_limit = RateLimit(config.rate_hz)
+        self._rate_limit = RateLimit(rung().rate_hz)
         self._backoff = Backoff(config.retry_first_s, config.retry_longest_s)
         self._run = first_run
         self._begun = False
@@ -171,10 +175,12 @@ class Capture(threading.Thread):
         if not source.live:
             time_ns += self._pass_began_ns
             self._pass_ends_ns = time_ns + period_ns(source.rate_hz)
+        rung = self._rung()
+        self._rate_limit.limit(rung.rate_hz)
         if not self._rate_limit.lets(time_ns):
             return
-        encoded, intrinsics = self._preparation.prepare(picture.image)
-        ready = Ready(self._run, picture.seq, time_ns, encoded, intrinsics)
+        encoded, intrinsics = self._preparation.prepare(picture.image, rung.quality)
+        ready = Ready(self._run, picture.seq, time_ns, encoded, intrinsics, rung.quality)
         put = self._handoff.put_live if source.live else self._handoff.put_recorded
         put(ready)
         self._wake()

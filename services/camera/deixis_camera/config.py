@@ -24,11 +24,28 @@ class CameraConfig(StageConfig):
         max_length=2000,
         description="Device number or path, video or GIF file, picture, folder of pictures, or http(s):// or rtsp(s):// URL.",
     )
-    encoding: Literal["bgr8", "jpeg"] = Field(
-        default="bgr8",
-        description="bgr8: raw bytes (grey pictures go as mono8); jpeg: smaller, for a slow network.",
+    encoding: Literal["auto", "bgr8", "jpeg"] = Field(
+        default="auto",
+        description="bgr8: raw bytes (grey pictures go as mono8); jpeg: smaller, for a network; auto: jpeg while a stage that "
+        "reads frames is a client of another router than the camera's, as on another host, else raw.",
     )
-    quality: int = Field(default=85, ge=1, le=100, description="JPEG quality.")
+    quality: int = Field(default=85, ge=1, le=100, description="JPEG quality; the best, where it adapts.")
+    adapt: bool = Field(
+        default=True,
+        description="Send less while answers of stages on another host come late or not at all, and more again when they come "
+        "in time: JPEG quality first, then rate. Never on one host, nor in lockstep.",
+    )
+    adapt_least_quality: int = Field(
+        default=50, ge=1, le=100, description="Adapting: lowest JPEG quality. At 50 the shipped clips are answered as raw ones."
+    )
+    adapt_least_rate_hz: float = Field(default=5.0, ge=0.2, le=60, description="Adapting: fewest frames per second.")
+    adapt_slack_ms: float = Field(
+        default=100.0,
+        ge=10,
+        le=1000,
+        description="Adapting: how much longer than the quickest answer of late a frame may be without one, before the next is "
+        "held back. A frame waits on the way about so long at most, in milliseconds.",
+    )
     rate_hz: float | None = Field(
         default=None,
         gt=0,

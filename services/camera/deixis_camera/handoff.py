@@ -14,13 +14,17 @@ from .pictures import Encoded
 
 @dataclass(frozen=True)
 class Ready:
-    """A picture ready to publish. `run` and `seq` name it; `time_ns` as in sources.Picture, and over all passes."""
+    """A picture ready to publish. `run` and `seq` name it; `time_ns` as in sources.Picture, and over all passes.
+
+    `quality` is that of the JPEG; none of a raw picture.
+    """
 
     run: int
     seq: int
     time_ns: int
     encoded: Encoded
     intrinsics: Intrinsics
+    quality: int | None = None
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,15 @@ def period_ns(rate_hz: float) -> int:
 
 
 class RateLimit:
-    """Lets through at most `rate_hz` pictures a second, evenly; all of them where it is None."""
+    """Lets through at most `rate_hz` pictures a second, evenly; all of them where it is 0."""
 
-    def __init__(self, rate_hz: float | None) -> None:
-        self._period_ns = round(1e9 / rate_hz) if rate_hz else 0
+    def __init__(self, rate_hz: float) -> None:
         self._next_ns: int | None = None
+        self.limit(rate_hz)
+
+    def limit(self, rate_hz: float) -> None:
+        """Set the rate from the next picture on."""
+        self._period_ns = round(1e9 / rate_hz) if rate_hz else 0
 
     def lets(self, time_ns: int) -> bool:
         """Whether the picture of `time_ns` (of any clock; a step back starts anew) is to be published."""

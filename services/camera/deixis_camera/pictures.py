@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -35,14 +34,13 @@ class Preparation:
     """Prepares the pictures of one source; `note` is told, under a key, what is done to them."""
 
     def __init__(self, config: CameraConfig, calibration: Calibration, note: Callable[[str, str], None]) -> None:
-        self._config = config
         self._calibration = calibration
         self._note = note
         self._normaliser = Normaliser(config.max_width)
         self._notes: dict[str, str] = {}
 
-    def prepare(self, image: Image) -> tuple[Encoded, Intrinsics]:
-        """The picture as it is published, and how it projects. Raises PictureRefused."""
+    def prepare(self, image: Image, quality: int | None) -> tuple[Encoded, Intrinsics]:
+        """The picture as it is published, a JPEG of `quality` or raw (None), and how it projects. Raises PictureRefused."""
         pixels = self._normaliser.normalise(image)
         try:
             intrinsics = self._calibration.for_size(pixels.shape[1], pixels.shape[0])
@@ -52,7 +50,7 @@ class Preparation:
             self._note_change("scaled", f"pictures of {_size(image)} are scaled down to {_size(pixels)}")
         if self._normaliser.deep:
             self._note_change("depth", f"16-bit pictures are taken as {self._normaliser.bits}-bit and published as 8-bit")
-        return encode(pixels, self._config.encoding, self._config.quality), intrinsics
+        return encode(pixels, quality), intrinsics
 
     def _note_change(self, key: str, text: str) -> None:
         if self._notes.get(key) != text:
@@ -101,13 +99,13 @@ class Normaliser:
         return np.right_shift(image, self.bits - 8, dtype=np.uint16).astype(np.uint8)
 
 
-def encode(pixels: Pixels, encoding: Literal["bgr8", "jpeg"], quality: int) -> Encoded:
-    """The bytes of a (H, W) or (H, W, 3) picture: raw (`mono8` where it is grey) or a JPEG of `quality` 1 to 100.
+def encode(pixels: Pixels, quality: int | None) -> Encoded:
+    """The bytes of a (H, W) or (H, W, 3) picture: a JPEG of `quality` 1 to 100, or raw (None; `mono8` where it is grey).
 
     Raises PictureRefused where the JPEG coder fails.
     """
     height, width = pixels.shape[:2]
-    if encoding == "bgr8":
+    if quality is None:
         return Encoded(width, height, "mono8" if pixels.ndim == 2 else "bgr8", pixels.tobytes())
     good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not good:

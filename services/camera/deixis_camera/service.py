@@ -15,12 +15,14 @@ from .capture import Capture
 from .config import CameraConfig
 from .handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
 from .info import CameraStatus
+from .link_control import LinkControl
 from .pacing import LOCKSTEP_EPOCH_NS, Lockstep, OwnRate, Readiness, missing
 from .sources import without_credentials
 
 INFO_PERIOD_S = 2.0
 INFO_PERIOD_FRAMES = 60
 STOP_WAIT_S = 1.0
+SETTLE_S = 0.5
 HEALTH: dict[str, HealthState] = {"retrying": "degraded", "failed": "failed"}
 
 
@@ -35,6 +37,7 @@ class CameraStage:
         self._beliefs = node.subscribe(topics.BELIEF, depth=8) if node.lockstep else None
         self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, node.lockstep)
         self.handoff = Handoff()
+        self._link = LinkControl(node, config)
         self._lockstep = Lockstep(config.lockstep_timeout_s)
         self._live = False
         self._started = False
@@ -49,6 +52,7 @@ class CameraStage:
 
     def run(self) -> None:
         """Until shutdown."""
+        self._settle()
         capture = self._start_capture()
         try:
             while self._node.wait(timeout_s=self._next_s()):
@@ -59,6 +63,13 @@ class CameraStage:
 
     # --- starting -----------------------------------------------------------------------------------------------------
 
+    def _settle(self) -> None:
+        """Wait a moment for those who are there to say where: the first pictures are made for them already."""
+        until_s = self._node.monotonic_s() + SETTLE_S
+        while not self._link.settled() and self._node.monotonic_s() < until_s:
+            if not self._node.wait(SETTLE_S / 10):
+                return
+
     def _start_capture(self) -> Capture | None:
         self._picture_s = self._node.monotonic_s()
         try:
@@ -68,7 +79,14 @@ class CameraStage:
             return None
         node = self._node
         capture = Capture(
-            self._config, calibration, self.handoff, first_run(node), lockstep=node.lockstep, wake=node.wake, log=node.log
+            self._config,
+            calibration,
+            self.handoff,
+            first_run(node),
+            rung=lambda: self._link.rung,
+            lockstep=node.lockstep,
+            wake=node.wake,
+            log=node.log,
         )
         capture.start()
         return capture
@@ -84,6 +102,7 @@ class CameraStage:
     def step(self) -> None:
         """One turn of the loop: apply what the capture thread reported, and publish what is due."""
         self._take_answers()
+        self._link.turn(self._node.monotonic_s())
         self._hold_s = INFO_PERIOD_S
         item = self.handoff.first()
         while item is not None and not isinstance(item, Ready):
@@ -109,7 +128,7 @@ class CameraStage:
     def _handle(self, picture: Ready) -> None:
         """Publish or drop the picture, or leave it for later and say for how long in `_hold_s`."""
         if self._live:
-            self._publish(picture, self._ago_ns(self._monotonic_ns() - picture.time_ns))
+            self._send(picture, self._ago_ns(self._monotonic_ns() - picture.time_ns))
         elif not self._others_ready():
             self._hold_s = 0.1
         elif self._node.lockstep:
@@ -128,7 +147,7 @@ class CameraStage:
         else:
             if decision.fell_behind:
                 self._node.count("playback_fell_behind")
-            self._publish(picture, self._ago_ns(decision.late_ns))
+            self._send(picture, self._ago_ns(decision.late_ns))
 
     def _feed(self, picture: Ready) -> None:
         now_s = self._node.monotonic_s()
@@ -143,6 +162,15 @@ class CameraStage:
             self._node.warn("lockstep", f"{key}: no answer to frame {unanswered} within {limit:g} s; the next is fed")
         self._publish(picture, LOCKSTEP_EPOCH_NS + picture.time_ns)
         self._lockstep.sent(FrameId(picture.run, picture.seq), now_s)
+
+    def _send(self, picture: Ready, stamp_ns: int) -> None:
+        """Publish the picture, or drop it where those before it are late: the next one is newer."""
+        if self._link.may_send(self._node.monotonic_s()):
+            self._publish(picture, stamp_ns)
+        else:
+            self.handoff.take(picture)
+            self._hold_s = 0.0
+            self._picture_s = self._node.monotonic_s()
 
     def _publish(self, picture: Ready, stamp_ns: int) -> None:
         """Publish the picture, unless a newer live one has come in its place meanwhile."""
@@ -171,6 +199,7 @@ class CameraStage:
             self._frames.put(frame)
         self._status.published(picture.run, picture.seq)
         self._picture_s = self._node.monotonic_s()
+        self._link.sent(FrameId(picture.run, picture.seq), len(encoded.data), picture.quality, self._picture_s)
 
     def _monotonic_ns(self) -> int:
         return round(self._node.monotonic_s() * 1e9)
@@ -212,6 +241,7 @@ class CameraStage:
         limit = self._config.rate_hz
         rate_hz = min(limit, opened.rate_hz) if limit and opened.rate_hz else limit or opened.rate_hz
         self._status.has_rate(rate_hz)
+        self._link.source_has_rate(rate_hz)
         self._picture_s = self._node.monotonic_s()
         if self._status.state != "streaming":  # not between two passes: the next one follows without a gap
             self._own_rate = OwnRate(rate_hz)

@@ -6,8 +6,9 @@ import hashlib
 import os
 import re
 import sqlite3
+import tempfile
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,27 +66,31 @@ class Registry:
         """Open the file, or make it with its folder; without a path, in memory. Raises RegistryError where that fails."""
         self.path = path or MEMORY
         self._pois: dict[str, Poi] = {}
+        self._listed: list[Poi] = []
         self._copied = False
         try:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(self.path, timeout=BUSY_MS / 1000, isolation_level=None)
         except (OSError, sqlite3.Error) as error:
-            raise RegistryError(f"registry {self.path}: cannot be opened: {error}") from None
+            raise RegistryError(f"registry {self.path}: cannot be opened: {_cause(error, self.path)}") from None
         try:
             self._prepare()
             self._pois = self._load()
         except sqlite3.Error as error:
             self._db.close()
             kind = CorruptError if _is_damage(error) else RegistryError
-            raise kind(f"registry {self.path}: {_cause(error)}") from None
+            raise kind(f"registry {self.path}: {_cause(error, self.path)}") from None
         except RegistryError:
             self._db.close()
             raise
 
     def pois(self) -> list[Poi]:
         """All POIs, by id."""
-        return [self._pois[poi_id] for poi_id in sorted(self._pois)]
+        # Listed once and not for each get: thousands take milliseconds.
+        if not self._listed:
+            self._listed = [self._pois[poi_id] for poi_id in sorted(self._pois)]
+        return list(self._listed)
 
     def get(self, poi_id: str) -> Poi | None:
         """The POI of that id."""
@@ -117,6 +122,7 @@ class Registry:
                 raise
             return [error] * len(results)
         self._pois = after
+        self._listed = []
         return results
 
     def put(self, poi: Poi) -> None:
@@ -153,6 +159,7 @@ class Registry:
         self._pois.update(stored)
         for poi_id in gone:
             self._pois.pop(poi_id, None)
+        self._listed = []
         return sorted(changed + gone)
 
     def keep_copy(self) -> None:
@@ -172,7 +179,11 @@ class Registry:
                 os.fsync(written.fileno())
             fresh.replace(good)
         except (OSError, sqlite3.Error) as error:
-            raise RegistryError(f"registry {self.path}: no copy kept: {error}") from None
+            raise RegistryError(f"registry {self.path}: no copy kept: {_cause(error, self.path)}") from None
+        finally:
+            # On a full disk what there is of it is room that the registry itself needs.
+            with suppress(OSError):
+                fresh.unlink(missing_ok=True)
         self._copied = True
 
     def close(self) -> None:
@@ -214,7 +225,7 @@ class Registry:
         try:
             return self._read("SELECT poi_id, content FROM baseline")
         except sqlite3.Error as error:
-            raise RegistryError(f"registry {self.path}: {_cause(error)}") from None
+            raise RegistryError(f"registry {self.path}: {_cause(error, self.path)}") from None
 
     def _read(self, query: str) -> dict[str, Poi]:
         pois = {}
@@ -240,7 +251,7 @@ class Registry:
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
-            raise RegistryError(f"registry {self.path}: not written: {_cause(error)}") from None
+            raise RegistryError(f"registry {self.path}: not written: {_cause(error, self.path)}") from None
 
 
 def default_path(robot: str, site: Path) -> Path:
@@ -286,13 +297,27 @@ def _delete(pois: dict[str, Poi], poi_id: str) -> tuple[Poi, Statement]:
     return pois.pop(poi_id), ("DELETE FROM pois WHERE poi_id = ?", (poi_id,))
 
 
-def _cause(error: sqlite3.Error) -> str:
+def _cause(error: OSError | sqlite3.Error, path: Path | str) -> str:
     text = str(error)
+    if isinstance(error, OSError):
+        return text
     if "locked" in text or "busy" in text:
         return "is locked by another process; is another fusion stage running on it?"
     if _is_damage(error):
         return f"is corrupt: {text}"
-    return text
+    # SQLite keeps to itself what the system told it; a file beside it is told the same.
+    refused = _refuses_files(path.parent) if isinstance(path, Path) else ""
+    return f"{text} ({refused})" if refused else text
+
+
+def _refuses_files(folder: Path) -> str:
+    """Why no file can be written in a folder; empty if one can. Never by the registry's own file: to close it ends the lock."""
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as tried:
+            tried.write(bytes(4096))
+    except OSError as error:
+        return f"{folder}: {error.strerror or error}"
+    return ""
 
 
 def _is_damage(error: sqlite3.Error) -> bool:

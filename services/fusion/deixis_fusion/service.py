@@ -24,6 +24,8 @@ from .sources import Reading, SourceEnd, SourceMonitor
 from .state import Asked, Standing, state_of
 
 DEPTH = 32
+# Made in one transaction, between two frames.
+EDITS_AT_ONCE = 256
 IDLE_S = 0.25
 # Stages start one after the other; until then a silent one is no fault.
 START_S = 5.0
@@ -87,6 +89,7 @@ class FusionService:
         try:
             self._registry.keep_copy()
         except RegistryError as error:
+            self._node.warn("registry copy", str(error))
             self._node.note("registry copy", str(error))
         else:
             self._node.note("registry copy", None)
@@ -101,7 +104,7 @@ class FusionService:
         self._count_to("parts_dropped", self._joiner.dropped)
 
     def _take_edits(self) -> None:
-        edits = self._poi_edits.take_all()
+        edits = self._poi_edits.take(EDITS_AT_ONCE)
         if edits:
             refused = self._edits.take(edits, self._node.now_ns())
             if refused:

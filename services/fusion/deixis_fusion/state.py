@@ -65,7 +65,8 @@ class Standing:
 def state_of(asked: Asked, standing: Standing, fusion: Fusion, registry: Registry, edits: PoiEdits) -> State:
     """The state as asked for. More than the topic allows is refused by the runtime, which says what to ask instead."""
     pois = registry.pois()
-    chosen = [poi for poi in pois if asked.rows.poi_id in (None, poi.poi_id)][: asked.rows.top]
+    named = None if asked.rows.poi_id is None else registry.get(asked.rows.poi_id)
+    chosen = pois[: asked.rows.top] if named is None else [named]
     return State(
         stamp_ns=standing.now_ns,
         stage=standing.producer.stage,

@@ -123,7 +123,7 @@ def estimate_bearing(seen: ArmSight, side: Side | None) -> Bearing:
     told = _described(likelihood / likelihood.max())
     if found is None:
         return told
-    elevation, spread = _moments(arms.elevations[found.rows], found.fits * (arms.share[found.rows] @ palm))
+    elevation, spread = _moments(arms.elevations[found.rows], found.fits * (arms.share_of(found.rows) @ palm))
     return replace(told, elevation_deg=elevation, elevation_sigma_deg=max(LEAST_SIGMA_DEG, spread))
 
 
@@ -147,7 +147,7 @@ def likelihood_of(found: ArmFits | None, arms: Arms) -> Floats:
     """How likely each of BEARINGS puts fingertip and fist there, its largest 1; all alike where no arm does."""
     if found is None:
         return np.ones(len(BEARINGS))
-    likelihood = found.fits @ arms.share[found.rows]
+    likelihood = found.fits @ arms.share_of(found.rows)
     return np.asarray((1 - NO_ARM) * likelihood / float(likelihood.max()) + NO_ARM)
 
 
@@ -171,33 +171,66 @@ def _finger_fits(expected: Floats, way: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Arms:
-    """tips, fists (n, 3): right, up, toward the camera from the head; lengths (n,): of the way from there to the tip; share
-    (n, bearings): to which bearing an arm counts, each column's sum over both sides 1; elevations (n,): how high it points,
-    degrees.
+    """tips, fists (n, 3): right, up, toward the camera from the head; lengths (n,): of the way from there to the tip;
+    elevations (n,): how high it points, degrees; rows (n,): where in `shares` it stands.
+
+    shares (arms of both sides, bearings): to which bearing an arm counts, each column's sum 1. One array for all sides: it is
+    by far the largest, 3.5 MB.
     """
 
     tips: Floats
     fists: Floats
     lengths: Floats
-    share: Floats
     elevations: Floats
+    rows: NDArray[np.intp]
+    shares: Floats
+
+    def share_of(self, chosen: NDArray[np.intp]) -> Floats:
+        """To which bearing each of some of these arms counts (chosen, bearings)."""
+        return np.asarray(self.shares[self.rows[chosen]])
 
 
 @cache
 def load_arms(side: Side | None) -> Arms:
     """The arms of a side, and the mirror images of the other, for either hand does the same; of both where it is not known."""
+    if side is None:
+        return _all_arms()[0]
+    both, is_left = _all_arms()
+    rows = np.flatnonzero(is_left == (side == "left"))
+    return replace(
+        both,
+        tips=both.tips[rows],
+        fists=both.fists[rows],
+        lengths=both.lengths[rows],
+        elevations=both.elevations[rows],
+        rows=rows,
+    )
+
+
+@cache
+def _all_arms() -> tuple[Arms, NDArray[np.bool_]]:
+    """The arms of both sides, and which of them are left ones."""
     with files("deixis_gesture").joinpath("arms.npz").open("rb") as file:
         stored = np.load(file)
         bearings, left, elevations = (stored[name] for name in ("bearings_deg", "left", "elevations_deg"))
         tips, fists = (np.concatenate([at, at * (-1, 1, 1)]).astype(np.float32) for at in (stored["tips"], stored["fists"]))
-    bearings, left = np.concatenate([bearings, -bearings]).astype(np.float32), np.concatenate([left, ~left])
-    off = (BEARINGS - bearings[:, None] + 180) % 360 - 180
-    share = np.exp(-0.5 * (off / NEAR_DEG) ** 2)
-    share = (share / share.sum(axis=0)).astype(np.float32)
-    of_side = np.full(len(left), True) if side is None else left == (side == "left")
     elevations = np.concatenate([elevations, elevations]).astype(np.float32)
-    lengths = np.linalg.norm(tips, axis=1)
-    return Arms(tips[of_side], fists[of_side], lengths[of_side], share[of_side], elevations[of_side])
+    shares = _shares(np.concatenate([bearings, -bearings]).astype(np.float32))
+    arms = Arms(tips, fists, np.linalg.norm(tips, axis=1), elevations, np.arange(len(tips)), shares)
+    return arms, np.concatenate([left, ~left])
+
+
+def _shares(bearings: Floats) -> Floats:
+    """To which of BEARINGS arms of these count. In place: each step in an array of its own took 7 MB."""
+    shares = BEARINGS - bearings[:, None] + 180
+    np.remainder(shares, 360, out=shares)
+    shares -= 180
+    shares /= NEAR_DEG
+    np.square(shares, out=shares)
+    shares *= -0.5
+    np.exp(shares, out=shares)
+    shares /= shares.sum(axis=0)
+    return shares.astype(np.float32)
 
 
 def _with_outliers(fits: Floats) -> Floats:

@@ -1,0 +1,176 @@
+"""Recordings as MCAP files (mcap.dev): each payload as it was sent, beside the JSON Schema of its type.
+
+MCAP is what robot tools read and write (Foxglove, Rerun, `mcap` of the command line). A channel is a key and a label of the
+payload; its message encoding is `msgpack`, or `json` as generic clients put POIs. A delete is an empty message on a channel
+whose metadata say `deleted`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any, Self
+
+import zstandard
+from deixis_schemas import codec, topics
+from deixis_schemas.export import json_schema
+
+# mcap (Foxglove's own, MIT): the reference implementation for Python, without dependencies but its two compressors.
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Message
+from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.writer import CompressionType, Writer
+
+from .raw_message import RawMessage
+
+LABEL, DELETED = "encoding", "deleted"
+# A chunk is what a process that is killed loses; frames fill one each, all else about a second's messages.
+CHUNK_BYTES = 256 << 10
+MAX_RECORD_BYTES = 256 << 20
+"""Of a record in a file that is read; the largest frame that the contract allows is half of it."""
+# What the library raises besides its own errors on bytes that are no MCAP.
+DAMAGED = (McapError, CRCValidationError, struct.error, zstandard.ZstdError, ValueError, KeyError, RuntimeError)
+
+
+class McapFileError(OSError):
+    """A recording that cannot be written or read; the text names the file."""
+
+
+class McapRecorder:
+    """Writes a recording. Use as a context manager: what is missing at the end of a file makes it slow to open elsewhere."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises McapFileError where the file cannot be made."""
+        self.path = path
+        self.messages = 0
+        self._channels: dict[tuple[str, str, bool], int] = {}
+        self._schemas: dict[str, int] = {}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[bytes] = path.open("wb")
+            # lz4: pictures hardly become smaller, and it takes the least time with them.
+            self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
+            self._writer.start(profile="", library="deixis")
+        except OSError as error:
+            raise _failed(path, error) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Raises McapFileError where the end cannot be written."""
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        except OSError as error:
+            raise _failed(self.path, error) from None
+        finally:
+            self._close()
+
+    def write(self, message: RawMessage) -> None:
+        """Append a message. Raises McapFileError, as for a full disk."""
+        try:
+            channel = self._channel(message)
+            self._writer.add_message(
+                channel, message.received_ns, message.payload, message.received_ns, self.messages & 0xFFFFFFFF
+            )
+        except OSError as error:
+            raise _failed(self.path, error) from None
+        self.messages += 1
+
+    def _channel(self, message: RawMessage) -> int:
+        name = (message.key, message.encoding, message.deleted)
+        if name not in self._channels:
+            metadata = {DELETED: "true"} if message.deleted else {LABEL: message.encoding}
+            kind = "" if message.deleted else _message_encoding(message.encoding)
+            self._channels[name] = self._writer.register_channel(message.key, kind, self._schema(message), metadata)
+        return self._channels[name]
+
+    def _schema(self, message: RawMessage) -> int:
+        """The type that the key carries; 0, which is none, for a key outside the contract and for a delete."""
+        topic = topics.topic_of(message.key)
+        if topic is None or message.deleted:
+            return 0
+        name = f"{topic.type.__name__}/{topic.version}"
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", json_schema(topic.type))
+        return self._schemas[name]
+
+    def _close(self) -> None:
+        try:
+            self._file.close()
+        except OSError as error:
+            raise _failed(self.path, error) from None
+
+
+class McapReader:
+    """The messages of a recording, in the order in which they were heard. Iterate once."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.cut = False
+        """Whether the file ended before its end, as after a kill or a full disk; known when all has been read."""
+
+    def __iter__(self) -> Iterator[RawMessage]:
+        """Raises McapFileError for a file that is missing or no recording; one that is cut gives what it holds."""
+        try:
+            with self.path.open("rb") as file:
+                yield from self._messages(file)
+        except OSError as error:
+            raise _failed(self.path, error) from None
+
+    def _messages(self, file: IO[bytes]) -> Iterator[RawMessage]:
+        channels: dict[int, Channel] = {}
+        records = iter(StreamReader(file, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES).records)
+        any_read = False
+        while True:
+            try:
+                record: Any = next(records, None)
+            except DAMAGED as error:
+                # Of a record that is cut the library says now this, now that.
+                self.cut = any_read and not file.read(1)
+                if self.cut:
+                    return
+                raise McapFileError(f"'{self.path}' is no MCAP file, or damaged: {str(error)[:200] or 'it is empty'}") from None
+            if record is None:
+                return
+            any_read = True
+            if isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                yield self._raw(channels, record)
+
+    def _raw(self, channels: dict[int, Channel], record: Message) -> RawMessage:
+        channel = channels.get(record.channel_id)
+        if channel is None:
+            raise McapFileError(f"'{self.path}' is damaged: a message of channel {record.channel_id}, which it does not have")
+        label, deleted = channel.metadata.get(LABEL, ""), DELETED in channel.metadata
+        return RawMessage(channel.topic, label, record.data, record.log_time, deleted)
+
+
+def keys_in(path: Path) -> set[str]:
+    """The keys that a recording has messages of. Raises McapFileError.
+
+    From the summary at the end of the file; one that was cut has none, and is read through.
+    """
+    try:
+        with path.open("rb") as file:
+            summary = SeekingReader(file, record_size_limit=MAX_RECORD_BYTES).get_summary()
+            if summary is not None:
+                return {channel.topic for channel in summary.channels.values()}
+    except DAMAGED:
+        pass  # reading it through says what is wrong
+    except OSError as error:
+        raise _failed(path, error) from None
+    return {message.key for message in McapReader(path)}
+
+
+def _message_encoding(label: str) -> str:
+    """MCAP's word for a payload's encoding; empty, which is none, for what it has no word for."""
+    media_type = label.split(";", maxsplit=1)[0]
+    return {codec.MSGPACK: "msgpack", codec.JSON: "json"}.get(media_type, "")
+
+
+def _failed(path: Path, error: OSError) -> McapFileError:
+    return error if isinstance(error, McapFileError) else McapFileError(f"'{path}': {error.strerror or error}")

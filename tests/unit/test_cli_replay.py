@@ -1,0 +1,149 @@
+"""What of a recording is said again, and how: in the order of frames, or with the stamps of now."""
+
+import argparse
+
+import pytest
+from deixis_cli.frame_groups import LOOK_AHEAD_NS, Line, by_frame
+from deixis_cli.mcap_file import McapRecorder
+from deixis_cli.options import CommandError
+from deixis_cli.raw_message import RawMessage
+from deixis_cli.replay import register, run, stages_in
+from deixis_cli.restamp import Restamper
+from deixis_schemas import codec, topics
+from deixis_schemas.messages import CameraInfo, FrameId, OfFrame
+from deixis_schemas.samples import FRAME, SAMPLES
+from hypothesis import given
+from hypothesis import strategies as st
+
+SAMPLE = {type(message).__name__: message for message in SAMPLES}
+MS = 1_000_000
+
+
+def line(topic, seq, at_ms, run=1):
+    message = SAMPLE[topic.type.__name__].model_copy(update={"run": run, "seq": seq} if seq is not None else {})
+    return Line(topic.key("r1"), topic, message, at_ms * MS)
+
+
+def said(groups):
+    return [[(item.topic.path, item.frame_id.seq if item.frame_id else None) for item in group] for group in groups]
+
+
+def test_answers_that_came_late_stand_with_their_frame():
+    lines = [
+        line(topics.FRAME, 0, 0),
+        line(topics.FRAME, 1, 33),
+        line(topics.TRACKS, 0, 40),
+        line(topics.ROBOT_POSE, None, 50),
+        line(topics.FRAME, 2, 66),
+        line(topics.TRACKS, 1, 70),
+    ]
+    assert said(by_frame(lines)) == [
+        [("camera/frame", 0), ("tracker/tracks", 0)],
+        [("camera/frame", 1), ("tracker/tracks", 1)],
+        [("robot/pose", None)],
+        [("camera/frame", 2)],
+    ]
+
+
+def test_frames_of_the_same_number_in_two_runs_are_two_frames():
+    lines = [line(topics.FRAME, 0, 0, run=1), line(topics.FRAME, 0, 10, run=2), line(topics.TRACKS, 0, 20, run=1)]
+    groups = list(by_frame(lines))
+    assert [group[0].frame_id for group in groups] == [FrameId(1, 0), FrameId(2, 0)]
+    assert len(groups[0]) == 2
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([topics.FRAME, topics.TRACKS, topics.HEAD_POSES, topics.ROBOT_POSE]),
+            st.integers(0, 5),
+            st.integers(0, 2 * LOOK_AHEAD_NS // MS),
+        ),
+        max_size=40,
+    )
+)
+def test_nothing_is_lost_or_said_twice(items):
+    lines = [line(topic, None if topic is topics.ROBOT_POSE else seq, at_ms) for topic, seq, at_ms in items]
+    groups = list(by_frame(lines))
+    assert sorted(id(item) for group in groups for item in group) == sorted(map(id, lines))
+    assert all(len({item.frame_id for item in group}) == 1 for group in groups)
+    assert all(len(group) == 1 for group in groups if group[0].frame_id is None)
+
+
+def test_messages_said_again_are_of_now_and_of_a_new_run():
+    now = Restamper(shift_ns=5_000, first_run=700, instance="replay-1")
+    first = now.now(FRAME.model_copy(update={"run": 3, "seq": 8}))
+    tracks = now.now(SAMPLE["Tracks"].model_copy(update={"run": 3, "seq": 8}))
+    later = now.now(FRAME.model_copy(update={"run": 4, "seq": 0}))
+    assert (first.run, first.seq, first.stamp_ns, first.instance) == (700, 8, FRAME.stamp_ns + 5_000, "replay-1")
+    assert tracks.frame_id == first.frame_id
+    assert later.run == 701
+    assert now.now(FRAME.model_copy(update={"run": 3})).run == 700, "a run keeps its new name"
+
+
+def test_a_target_said_again_began_and_ended_as_long_ago_as_it_did():
+    target = SAMPLE["Target"]
+    moved = Restamper(10_000, 1, "replay-1").now(target)
+    assert moved.stamp_ns - moved.started_ns == target.stamp_ns - target.started_ns
+    assert moved.ended_ns - moved.started_ns == target.ended_ns - target.started_ns
+
+
+def test_a_camera_that_has_sent_nothing_yet_names_no_run():
+    now = Restamper(0, 700, "replay-1")
+    info = SAMPLE["CameraInfo"]
+    silent = now.now(info.model_copy(update={"run": 0, "last_seq": -1, "lockstep": True}))
+    assert (silent.run, silent.lockstep) == (0, False)
+    assert now.now(info.model_copy(update={"run": 9, "last_seq": 4})).run == 700
+
+
+@pytest.mark.parametrize("message", SAMPLES, ids=lambda message: type(message).__name__)
+def test_what_is_said_again_keeps_to_the_contract(message):
+    again = Restamper(-(10**18) * 3, 1, "replay-1").now(message)
+    assert codec.decode(type(again), codec.encode(again), codec.encoding_of(type(again)), max_bytes=1 << 27) == again
+    if not isinstance(message, OfFrame | CameraInfo) and not hasattr(message, "stamp_ns"):
+        assert again == message
+
+
+# --- what is refused before anything starts ---------------------------------------------------------------------------
+
+
+def recorded(path, *names):
+    with McapRecorder(path) as recorder:
+        for name in names:
+            message = SAMPLE[name]
+            topic = next(topic for topic in topics.TOPICS if topic.type is type(message))
+            key = topic.key("r1", stage="camera", id="door")
+            recorder.write(RawMessage(key, codec.encoding_of(type(message)), codec.encode(message), 1))
+    return path
+
+
+def given_(*arguments):
+    parser = argparse.ArgumentParser()
+    register(parser.add_subparsers())
+    return parser.parse_args(["replay", *map(str, arguments)])
+
+
+def test_a_stage_speaks_in_a_recording_when_it_speaks_of_frames(tmp_path):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Health", "Poi", "Tracks", "Belief")
+    assert stages_in(path) == {"tracker", "fusion"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--as", "camera"], "no messages of 'camera' about frames .it holds those of: tracker"),
+        (["--as", "oracle"], "no stage 'oracle'"),
+        (["--as", ","], "--as names no stage"),
+        (["--as", "tracker"], "headpose would run without pictures: give --as camera,tracker, or --except headpose"),
+        (["--as", "tracker", "--only", "fusion", "--pictures"], "--pictures goes with --out"),
+    ],
+)
+def test_what_cannot_be_played_is_refused_with_what_to_do(tmp_path, arguments, text):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Tracks")
+    with pytest.raises(CommandError, match=text):
+        run(given_(path, *arguments))
+
+
+def test_a_missing_recording_is_named():
+    with pytest.raises(CommandError, match=r"none\.mcap"):
+        run(given_("none.mcap"))
