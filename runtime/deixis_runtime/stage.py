@@ -17,11 +17,13 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health, HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
+from .certificates import certificates_of
 from .clock_watch import ClockWatch
 from .delivery import PROFILES
 from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
+from .link_watch import CertificateWatch, say
 from .liveliness import AliveStages
 from .manager import Manager
 from .memory import settle
@@ -71,6 +73,8 @@ class Node:
         self._edits: list[EditQueue] = []
         self._clocks: list[ClockWatch] = []
         self._clock_of_frames: ClockWatch | None = None  # for ages only; said by who is asked to follow it
+        certificates = certificates_of()
+        self._certificate = CertificateWatch(certificates) if certificates is not None else None
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._alone = alone
@@ -237,6 +241,7 @@ class Node:
         self._log_state()
         self._look_at_queues()
         self._look_at_clocks()
+        self._look_at_certificate()
         if self._alone:
             self._look_at_doubles()
         self._health.put(self._record())
@@ -301,6 +306,15 @@ class Node:
             self.note(f"clock {watch.stage}", complaint)
             if complaint:
                 self.warn(f"clock {watch.stage}", f"{watch.key}: {complaint}; run NTP or chrony on both")
+
+    def _look_at_certificate(self) -> None:
+        """That of this host, which its router uses: the router itself has no health to say it in."""
+        if self._certificate is None:
+            return
+        found = self._certificate.turn(time.monotonic(), time.time())
+        self.note("certificate", self._certificate.complaint)
+        if found is not None:
+            self.warn("certificate", say(found))
 
     def _look_at_queues(self) -> None:
         """What was lost or dropped before the stage saw it is said in health."""
