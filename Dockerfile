@@ -32,7 +32,7 @@ RUN useradd --uid 10001 --no-create-home --home-dir /var/lib/deixis deixis \
 COPY config /etc/deixis
 WORKDIR /var/lib/deixis
 CMD ["python", "-m", "deixis_runtime.router", "--config", "/etc/deixis/edge.json5", \
-     "--listen", "unixsock-stream//run/deixis/router.sock", "--listen", "tcp/0.0.0.0:7447"]
+     "--listen", "unixsock-stream//run/deixis/router.sock"]
 ARG STAGES=
 RUN for stage in $STAGES; do set -- "$@" /wheels/deixis_$stage-*.whl; done; [ $# -eq 0 ] \
     || pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt "$@"

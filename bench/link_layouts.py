@@ -93,7 +93,7 @@ class Layout:
         up = [BIN / "deixis", "up", "--robot", ROBOT, "--site", self._site]
         registry = ["--registry", self.folder / "pois.sqlite"]
         at_edge = f"tcp/{self.hosts.address[edge]}:{PORT}"
-        self._start(edge, edge, [*up, "--except", "camera", *registry, "--listen", f"tcp/0.0.0.0:{PORT}"])
+        self._start(edge, edge, [*up, "--except", "camera", *registry, "--listen", f"tcp/0.0.0.0:{PORT}", "--insecure"])
         self._start(robot, robot, [*up, "--only", "camera", "--connect", at_edge, *self._sets("camera.")])
         for host in self.hosts.names:
             self._wait_for(host, "started, reached at")

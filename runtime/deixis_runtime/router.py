@@ -15,25 +15,35 @@ from pathlib import Path
 
 import zenoh
 
+from .certificates import add_certificates, certificates_of
 from .interrupts import Interrupts
 from .limit import RateLimit
+from .link_security import LinkSecurity, SecurityError, cautions, endpoints, secure
+from .link_watch import LinkWatch
 from .manager import Manager
 from .memory import settle
+from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
-from .stage import EXIT_UNREACHABLE, setup_logging
+from .stage import EXIT_CONFIG, EXIT_UNREACHABLE, setup_logging
 from .two_links import two_links
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
 OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
+TURN_S = 0.1
 SOCKET_FOLDER_PREFIX = "deixis-"
 
 log = logging.getLogger("deixis-router")
 
 
-def router_config(listen: list[str], connect: list[str], file: Path | None = None) -> zenoh.Config:
-    """Configuration of a host's router. Peers that are not there yet are tried again and again."""
+def router_config(
+    listen: list[str], connect: list[str], file: Path | None = None, security: LinkSecurity | None = None
+) -> zenoh.Config:
+    """Configuration of a host's router. Peers that are not there yet are tried again and again.
+
+    Raises Unreachable for a bad `file`, SecurityError where it must not start so.
+    """
     config = base_config("router", file)
     settings = {
         "transport/unicast/max_links": 2,
@@ -54,29 +64,42 @@ def router_config(listen: list[str], connect: list[str], file: Path | None = Non
     given = {side: json.loads(config.get_json(f"{side}/endpoints")) for side in ("listen", "connect")} if file else {}
     put_settings(config, {"listen/endpoints": listen + _endpoints(given.get("listen"))})
     put_settings(config, {"connect/endpoints": connect + _endpoints(given.get("connect"))})
+    secure(config, security or LinkSecurity())
     return config
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the router until told to stop. Exit status 69 when it cannot listen."""
+    """Run the router until told to stop. Exit status 69 when it cannot listen, 78 when it must not start so."""
     parser = argparse.ArgumentParser(prog="python -m deixis_runtime.router", description=main.__doc__)
     parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT")
     parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help="router of another host")
     parser.add_argument("--config", type=Path, metavar="FILE", help="Zenoh configuration (json5) to start from")
+    add_certificates(parser)
+    parser.add_argument("--insecure", action="store_true", help="listen on the network without TLS all the same")
+    parser.add_argument("--frames-stay", action="store_true", help="let no frame leave this host")
     parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
     given = parser.parse_args(argv)
     setup_logging()
     zenoh.init_log_from_env_or("error")
-    parent = os.getppid() if given.supervised else None
+    parent = Parent(os.environ) if given.supervised else None
     with Interrupts() as interrupts:
         status = _route(given, interrupts, parent)
     exit_now(status)
     return status
 
 
-def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None) -> int:
+def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | None) -> int:
+    certificates = certificates_of()
+    security = LinkSecurity(certificates, insecure=given.insecure, frames_stay=given.frames_stay)
     try:
-        session = zenoh.open(router_config(given.listen, given.connect, given.config))
+        config = router_config(given.listen, given.connect, given.config, security)
+        listen, connect = endpoints(config, "listen"), endpoints(config, "connect")
+        for caution in cautions(listen, connect):
+            log.warning("%s", caution)
+        session = zenoh.open(config)
+    except SecurityError as error:
+        log.error("%s", error)
+        return EXIT_CONFIG
     except Unreachable as error:
         log.error("%s", error)
         return EXIT_UNREACHABLE
@@ -85,29 +108,28 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
-    _watch_links(session, given.listen, given.connect, interrupts, parent)
+    _watch_links(session, listen, LinkWatch(connect, certificates), interrupts, parent)
     close(session)
     return 0
 
 
 def _watch_links(
-    session: zenoh.Session, listen: list[str], connect: list[str], interrupts: Interrupts, parent: int | None
+    session: zenoh.Session, listen: list[str], links: LinkWatch, interrupts: Interrupts, parent: Parent | None
 ) -> None:
-    linked: bool | None = None
-    manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    manager, limit, look_s, linked = Manager(os.environ), RateLimit(), 0.0, False
     settle()
-    _tell_manager(manager, limit, "routing")
-    while not interrupts.wait(CHECK_S):
-        if parent is not None and os.getppid() != parent:
+    while not interrupts.requested():
+        if parent is not None and parent.gone():
             log.error("the supervisor is gone; stopping")
             _remove_socket_folders(listen)
             return
-        now = bool(session.info.routers_zid())
-        if connect and now != linked:
-            level, text = (logging.INFO, "linked to %s") if now else (logging.WARNING, "no link yet to %s")
-            log.log(level, text, ", ".join(connect))
-        linked = now
+        if time.monotonic() >= look_s:
+            look_s = time.monotonic() + CHECK_S
+            linked = bool(session.info.routers_zid())
+            for level, text in links.turn(linked, time.monotonic(), time.time()):
+                log.log(level, "%s", text)
         _tell_manager(manager, limit, "linked" if linked else "no link to another router")
+        interrupts.wait(TURN_S)
 
 
 def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:
