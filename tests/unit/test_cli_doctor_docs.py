@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "doctor.md").read_text()
 PACKAGES = ("cli/deixis_cli", "runtime/deixis_runtime", "services/camera/deixis_camera")
 # What doctor says comes from these; the other sources of a finding's text stand in the findings themselves.
-PARTS_FROM = ("runtime/deixis_runtime/clock_watch.py", "cli/deixis_cli/system.py")
+PARTS_FROM = ("runtime/deixis_runtime/clock_watch.py", "runtime/deixis_runtime/endpoint.py", "cli/deixis_cli/system.py")
 BLANK = "…"
 # Less than a word of its own: what a stage says of itself, put behind its name.
 FEWEST_LETTERS = 7
