@@ -33,8 +33,8 @@ else
 endif
 
 test: setup check
-	@# Two at a time; a file's tests stay together, for they share the system that they run.
-	@$(BIN)/pytest -n 2 --dist loadfile
+	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
+	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
