@@ -4,37 +4,21 @@ The test publishes and subscribes as stages and people would. What is denied is 
 behind it, and when that has come the rest would have.
 """
 
-import os
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
 import pytest
 import zenoh
-from deixis_runtime.certificates import VARIABLE
 from deixis_runtime.session import client_config
 from running import answers, free_port, process, wait_until
-from site_made import YEAR, add, make_site
+from site_made import YEAR, add, holder, make_site
 
-PATIENCE_S = 10.0
+PATIENCE_S = 30.0
 ROBOT = "r1"
 
 
 def key(path, robot=ROBOT):
     return f"deixis/{robot}/{path}"
-
-
-@contextmanager
-def holder(certificates):
-    """As one who has this folder of certificates; none for a program of the host itself."""
-    before = os.environ.pop(VARIABLE, None)
-    if certificates is not None:
-        os.environ[VARIABLE] = str(certificates.folder)
-    try:
-        yield
-    finally:
-        os.environ.pop(VARIABLE, None)
-        if before is not None:
-            os.environ[VARIABLE] = before
 
 
 class Party:
