@@ -15,7 +15,7 @@ FROM python:3.11-slim-bookworm
 ENV PYTHONUNBUFFERED=1 \
     # As deixis_runtime.environment has it.
     OPENBLAS_NUM_THREADS=1 \
-    # Two fresh buffers a frame cost hundreds of page faults where malloc gives large blocks back at once.
+    MALLOC_ARENA_MAX=1 \
     MALLOC_MMAP_THRESHOLD_=67108864 \
     MALLOC_TRIM_THRESHOLD_=134217728
 # What others wrote has a layer of its own, so that a change of ours is a small download. What is needed, and in which

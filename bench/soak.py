@@ -150,7 +150,7 @@ def _watch(host: Host, seconds: float, done: Callable[[], bool]) -> None:
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s and not done():
         host.poll()
-        ended = [name for name, process in host.supervisor.processes.items() if process.restarts or process.given_up]
+        ended = [name for name, process in host.supervisor.processes.items() if process.last_end or process.given_up]
         if ended:
             raise HostFailed(f"ended while it was watched: {', '.join(ended)}")
         time.sleep(TURN_S)

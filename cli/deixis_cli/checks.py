@@ -88,8 +88,8 @@ def hung_stages(system: System) -> Iterator[Finding]:
 
 
 def ill_stages(system: System) -> Iterator[Finding]:
-    """What stages say of themselves."""
-    for process in system.processes:
+    """What stages say of themselves, and supervisors of them."""
+    for process in (*system.processes, *system.supervisors):
         health = process.health
         if health is None:
             continue

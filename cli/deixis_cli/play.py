@@ -14,6 +14,7 @@ import zenoh
 from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
+from deixis_runtime.supervisor_health import STAGE as SUPERVISOR
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
@@ -185,7 +186,7 @@ class Playback:
         if message is None:
             return
         self._counts[type(message).__name__] += 1
-        if isinstance(message, Health):
+        if isinstance(message, Health) and message.stage != SUPERVISOR:
             self.result.health[message.stage] = message
         if isinstance(message, Target) and message.final:
             self._targets.append(message)
@@ -206,7 +207,8 @@ class Playback:
         if topics.POI.stage in self._options.stages:
             self.result.names = get_names(host.session, self._options.robot)
         for health in get_healths(host.session, self._options.robot):
-            self.result.health[health.stage] = health
+            if health.stage != SUPERVISOR:  # it is we, and say in `failure` what is worth saying
+                self.result.health[health.stage] = health
 
     def _ended(self) -> bool:
         return self._end.camera is not None and self._end.camera.state == "ended"

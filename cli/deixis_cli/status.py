@@ -37,7 +37,7 @@ def run(given: argparse.Namespace) -> int:
         system = look(session, given.robot, CPU_OVER_S)
     if given.json:
         print(json.dumps(document(system, given.connect)))
-    elif system.processes:
+    elif system.processes or system.supervisors:
         print_system(system)
     if not system.processes:
         print(f"deixis status: the router at {given.connect} knows no stage of robot '{given.robot}'", file=sys.stderr)
@@ -50,21 +50,23 @@ def document(system: System, endpoint: str) -> dict[str, Any]:
     return {
         "robot": system.robot,
         "endpoint": endpoint,
-        "stages": [
-            {
-                "stage": process.stage,
-                "instance": process.instance,
-                "state": system.standing(process),
-                "alive": process.alive,
-                "cpu_percent": None if process.cpu_percent is None else round(process.cpu_percent, 1),
-                "health": process.health.model_dump(mode="json") if process.health else None,
-            }
-            for process in system.processes
-        ],
+        "stages": [_process_document(system, process) for process in system.processes],
+        "supervisors": [_process_document(system, process) for process in system.supervisors],
         "missing": system.missing(),
         "doubled": system.doubled(),
         "camera": system.camera.model_dump(mode="json") if system.camera else None,
         "pois": system.state.pois_total if system.state else None,
+    }
+
+
+def _process_document(system: System, process: StageProcess) -> dict[str, Any]:
+    return {
+        "stage": process.stage,
+        "instance": process.instance,
+        "state": system.standing(process),
+        "alive": process.alive,
+        "cpu_percent": None if process.cpu_percent is None else round(process.cpu_percent, 1),
+        "health": process.health.model_dump(mode="json") if process.health else None,
     }
 
 
@@ -76,7 +78,7 @@ def print_system(system: System) -> None:
     table = Table(box=None, pad_edge=False)
     for name in ("STAGE", "STATE", "PROCESS", "HOST", "UP", "CPU", "MB", "STEP", "OUT", "IN (rate, age, dropped, refused)"):
         table.add_column(name)
-    for process in system.processes:
+    for process in (*system.processes, *system.supervisors):
         table.add_row(*_row(process, system.standing(process)))
     console.print(table)
     for line in remarks(system):
@@ -86,7 +88,7 @@ def print_system(system: System) -> None:
 def remarks(system: System) -> list[str]:
     """What a reader of the table should know besides."""
     lines = [f"{stage}: not there" for stage in system.missing()]
-    for process in system.processes:
+    for process in (*system.processes, *system.supervisors):
         if process.health is None:
             lines.append(f"{process.stage}: {UNANSWERED[system.standing(process)]}")
             continue

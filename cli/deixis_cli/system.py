@@ -9,6 +9,7 @@ from typing import Literal
 
 import zenoh
 from deixis_runtime.clock_offset import Exchange, Offset, estimate
+from deixis_runtime.supervisor_health import STAGE as SUPERVISOR
 from deixis_runtime.versions import versions_of
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, State
@@ -43,7 +44,10 @@ class StageProcess:
 
 @dataclass(frozen=True)
 class System:
-    """All that is known of one robot's system. refused: healths we cannot read; ours: versions that the asker runs."""
+    """All that is known of one robot's system.
+
+    supervisors: of its hosts, as they started the stages. refused: healths we cannot read; ours: versions that the asker runs.
+    """
 
     robot: str
     processes: list[StageProcess] = field(default_factory=list)
@@ -51,6 +55,7 @@ class System:
     state: State | None = None
     refused: list[Refusal] = field(default_factory=list)
     ours: Mapping[str, str] = field(default_factory=dict)
+    supervisors: list[StageProcess] = field(default_factory=list)
 
     def heard(self) -> set[str]:
         """`stage/instance` of all whose messages the stages have heard lately."""
@@ -98,9 +103,12 @@ def look(session: zenoh.Session, robot: str, cpu_over_s: float = 0.0) -> System:
         )
         for who in sorted(tokens | set(after), key=_in_order)
     ]
+    supervisors = [process for process in processes if process.stage == SUPERVISOR]
+    processes = [process for process in processes if process.stage != SUPERVISOR]
     cameras, _ = get_all(session, topics.CAMERA_INFO.key(robot), CameraInfo)
     state = get_state(session, robot)
-    return System(robot, processes, cameras[0][1] if cameras else None, state, refused, versions_of("cli"))
+    camera = cameras[0][1] if cameras else None
+    return System(robot, processes, camera, state, refused, versions_of("cli"), supervisors)
 
 
 def alive_processes(session: zenoh.Session, robot: str) -> set[tuple[str, str]]:

@@ -14,7 +14,7 @@ from .options import add_host, add_robot, host_options, read_site
 
 log = logging.getLogger("deixis-up")
 
-TURN_S = 0.1
+TURN_S = 0.05
 
 
 def register(subparsers: Any) -> None:

@@ -34,7 +34,7 @@ def main(argv: list[str] | None = None) -> int:
     command = given.command[1:] if given.command[:1] == ["--"] else given.command
     if not command:
         parser.error("a command is needed")
-    patience = Patience(ready_s=given.ready_s, silent_s=given.silent_s, blind_s=given.silent_s / 2)
+    patience = Patience(ready_s=given.ready_s, silent_s=given.silent_s)
     with Interrupts() as interrupts, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
         heard.bind("")  # a free abstract name: nothing is left of it in the file system
         heard.settimeout(TURN_S)
@@ -45,14 +45,12 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _guard(child: subprocess.Popen[bytes], heard: socket.socket, interrupts: Interrupts, watchdog: Watchdog) -> int:
-    beats = 0
     while child.poll() is None:
         if interrupts.requested():
             return _stop(child)
         if _hears(heard):
-            beats += 1
-            watchdog.beat(child.pid, beats, time.monotonic())
-        for why in watchdog.hanging({NAME: child.pid}, "its socket", time.monotonic()).values():
+            watchdog.beat(child.pid)
+        for why in watchdog.hanging({NAME: child.pid}, time.monotonic()).values():
             _say(f"{NAME} {why}; killing it")
             child.kill()
             child.wait()

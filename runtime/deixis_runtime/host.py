@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import logging
-import socket
+import os
 import sys
 import tempfile
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -16,21 +15,27 @@ from pathlib import Path
 from typing import Self
 
 import zenoh
-from deixis_schemas import codec, topics
-from deixis_schemas.messages import Health
+from deixis_schemas import topics
 
+from .hang_watch import HangWatch
 from .launching import Forkable, ForkServer
-from .limit import RateLimit
+from .leftovers import Leftovers, remove_unused
 from .link_security import LinkSecurity, SecurityError
-from .liveliness import AliveStages
+from .notifications import Notifications
+from .parent import SUPERVISED_BY
+from .procfs import locked_inodes
 from .router import SOCKET_FOLDER_PREFIX, router_config
 from .session import DEFAULT_ENDPOINT, Unreachable, open_client
+from .settings import CommonOptions, default_instance
+from .stage import Node
 from .supervisor import Supervisor
-from .watchdog import Patience, Watchdog
+from .supervisor_health import STAGE, account_of
+from .watchdog import Patience
 
 log = logging.getLogger("deixis-supervisor")
 
-POLL_S = 0.05
+POLL_S = 0.02
+HELD_PERIOD_S = 0.5
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
 SOURCE = topics.FRAME.stage
@@ -94,23 +99,30 @@ class Host:
         self.supervisor = Supervisor()
         self.session: zenoh.Session
         self._stack = ExitStack()
-        self._alive: AliveStages
-        self._watchdog = Watchdog(options.patience)
-        self._heard: deque[tuple[int, int, float]] = deque()
-        self._limit = RateLimit()
-        self._declared: list[object] = []
+        self._watch: HangWatch
+        self._node: Node | None = None
+        self._leftovers = Leftovers()
+        self._held_looked_s = 0.0
         self._stopped: Callable[[], bool] = lambda: False
 
     def __enter__(self) -> Self:
         # A socket's path is limited to about 100 bytes, so not below the user's working directory.
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=SOCKET_FOLDER_PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
-        self._stack.callback(self.supervisor.stop)
+        patience = self.options.patience
+        notifications = self._stack.enter_context(Notifications(folder / "notify.sock", patience.silent_s))
+        self._watch = HangWatch(notifications, patience)
+        self.supervisor.environment = notifications.environment() | {SUPERVISED_BY: str(os.getpid())}
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._declared.clear()
+        # The children first: a router that hangs would hold the end of our own session.
+        self._note_held()
+        self.supervisor.stop()
+        self._node = None
         self._stack.close()
+        self._note_held()
+        self._remove_leftovers()
 
     @property
     def given_up(self) -> dict[str, str]:
@@ -132,25 +144,41 @@ class Host:
         self._start_stages(tuple(name for name in self.options.stages if name == SOURCE))
 
     def poll(self) -> None:
-        """Watch the children; call it a few times a second. Raises HostFailed when the router or all stages are given up."""
+        """Watch the children; call it several times a second. Raises HostFailed when the router or all stages are given up."""
         self.supervisor.poll()
-        self._end_hanging()
+        now_s = time.monotonic()
+        for name, why in self._watch.hanging(self.supervisor.running(), now_s).items():
+            self._note_held()
+            self.supervisor.kill(name, why)
+        if now_s - self._held_looked_s > HELD_PERIOD_S:
+            self._held_looked_s = now_s
+            self._note_held()
+            self._remove_leftovers()
+        self._tell(now_s)
         failed = self.supervisor.failed()
         if ROUTER in failed or (self.options.stages and failed.keys() >= set(self.options.stages)):
             raise HostFailed("; ".join(f"{name} is given up: {why}" for name, why in failed.items()))
 
-    def _end_hanging(self) -> None:
-        while self._heard:
-            self._watchdog.beat(*self._heard.popleft())
-        running = {
-            process.name: process.popen.pid
-            for process in self.supervisor.processes.values()
-            if process.name != ROUTER and process.popen is not None and process.running
-        }
-        router = next(iter(self.session.info.routers_zid()), None)
-        hanging = self._watchdog.hanging(running, None if router is None else str(router), time.monotonic())
-        for name, why in hanging.items():
-            self.supervisor.kill(name, why)
+    def _tell(self, now_s: float) -> None:
+        """Say in health how the children fare, and answer who asks."""
+        if self._node is None:
+            return
+        account = account_of(self.supervisor.processes.values(), now_s)
+        for process in self.supervisor.processes:
+            self._node.note(process, account.notes.get(process))
+        for process, restarts in account.restarts.items():
+            self._node.count_to(f"restarts_{process}", restarts)
+        self._node.set_state(account.state, account.reason)
+        self._node.wait(0.0)
+
+    def _note_held(self) -> None:
+        self._leftovers.note(set(self.supervisor.running().values()), locked_inodes())
+
+    def _remove_leftovers(self) -> None:
+        gone, removed = remove_unused(self._leftovers.left())
+        self._leftovers.forget(gone)
+        if removed:
+            log.info("removed %d files of shared memory that a killed process left", removed)
 
     def forkables(self) -> list[Forkable]:
         """The router and our own stages, of which a test holds that their imports start no threads."""
@@ -180,18 +208,28 @@ class Host:
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._stack.callback(self._declared.clear)
-        robot = self.options.robot
-        self._alive = AliveStages(self.session, robot)
-        self._declared.append(self.session.declare_subscriber(topics.HEALTH.key(robot, stage="*"), self._note_health))
+        self._node = Node(self.session, STAGE, self._node_options(), alone=False)
+
+    def _node_options(self) -> CommonOptions:
+        options = self.options
+        return CommonOptions(
+            robot=options.robot,
+            instance=default_instance(),
+            connect=self.endpoint,
+            lockstep=False,
+            supervised=False,
+            started_before=0,
+            site=None,
+            sets=(),
+        )
 
     def _start_stages(self, names: tuple[str, ...]) -> None:
         for name in names:
-            self.supervisor.start(name, self._stage_command(name))
+            self.supervisor.start(name, self._stage_command(name), needs=ROUTER)
         self._wait_until(lambda: not self._not_alive(names), lambda: self._not_alive(names))
 
     def _not_alive(self, names: tuple[str, ...]) -> set[str]:
-        return set(names) - self._alive.stages()
+        return set(names) - (self._node.alive_stages() if self._node else set())
 
     def _stage_command(self, name: str) -> list[str]:
         script = _script(name)
@@ -217,18 +255,8 @@ class Host:
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
                 raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
+            self._tell(time.monotonic())
             time.sleep(POLL_S)
-
-    def _note_health(self, sample: zenoh.Sample) -> None:
-        try:
-            health = codec.decode(Health, sample.payload.to_bytes(), str(sample.encoding))
-        except codec.CodecError as error:
-            # Whoever sends it counts as silent, and is killed for that: the cause has to be said.
-            if self._limit.allow(str(sample.key_expr), time.monotonic()) is not None:
-                log.warning("%s: a heartbeat that breaks the contract: %s", sample.key_expr, error)
-            return
-        if health.host == socket.gethostname():
-            self._heard.append((health.pid, health.count, time.monotonic()))
 
 
 def _script(stage: str) -> Path:

@@ -11,6 +11,7 @@ from deixis_schemas.messages import Message, OutputHealth
 from deixis_schemas.topics import Topic
 
 from .delivery import PROFILES
+from .patient_puts import PatientPuts
 from .rate import Rate
 
 
@@ -18,15 +19,26 @@ class Publisher:
     """Publishes messages of one topic on one key."""
 
     def __init__(
-        self, session: zenoh.Session, topic: Topic, key: str, report: Callable[[str, str], None], *, lossless: bool = False
+        self,
+        session: zenoh.Session,
+        topic: Topic,
+        key: str,
+        report: Callable[[str, str], None],
+        *,
+        lossless: bool = False,
+        patient_puts: PatientPuts | None = None,
     ) -> None:
-        """`lossless` waits where a link is full instead of dropping: for lockstep, where a lost frame makes runs differ."""
+        """`lossless` waits where a link is full instead of dropping: for lockstep, where a lost frame makes runs differ.
+
+        That may take seconds; with `patient_puts` the loop is not held so long.
+        """
         profile = PROFILES[topic.delivery]
         self.key = key
         self.published = 0
         self.oversized = 0
         self._topic = topic
         self._report = report
+        self._patient_puts = patient_puts
         self._rate = Rate(time.monotonic())
         self._publisher = session.declare_publisher(
             key,
@@ -48,7 +60,10 @@ class Publisher:
             self.oversized += 1
             self._report(f"size {self.key}", f"{self.key}: not published: {oversize(len(payload), self._topic)}")
             return
-        self._publisher.put(payload)
+        if self._patient_puts is None:
+            self._publisher.put(payload)
+        elif not self._patient_puts.do(lambda: self._publisher.put(payload)):
+            return
         self.published += 1
 
     def matching(self) -> bool:

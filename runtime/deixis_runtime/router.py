@@ -22,12 +22,16 @@ from .link_security import LinkSecurity, SecurityError, cautions, endpoints, sec
 from .link_watch import LinkWatch
 from .manager import Manager
 from .memory import settle
+from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE, setup_logging
+from .two_links import two_links
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
+OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
+TURN_S = 0.1
 SOCKET_FOLDER_PREFIX = "deixis-"
 
 log = logging.getLogger("deixis-router")
@@ -42,16 +46,21 @@ def router_config(
     """
     config = base_config("router", file)
     settings = {
+        "transport/unicast/max_links": 2,
         "transport/link/tx/lease": LEASE_MS,
         # It hands on what stages put into shared memory, and lays out 16 MB of its own for nothing.
         "transport/shared_memory/transport_optimization/enabled": False,
         "listen/exit_on_failure": True,
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2},
+        # A link that is back is to be found at once. TCP asks ever more seldom: a connection that does not come is begun anew.
+        "connect/retry": {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2},
+        "transport/unicast/open_timeout": OPEN_TIMEOUT_MS,
     }
     if file is None:
         put_settings(config, settings)
+    if json.loads(config.get_json("transport/unicast/max_links")) > 1:
+        connect = [link for endpoint in connect for link in two_links(endpoint)]
     given = {side: json.loads(config.get_json(f"{side}/endpoints")) for side in ("listen", "connect")} if file else {}
     put_settings(config, {"listen/endpoints": listen + _endpoints(given.get("listen"))})
     put_settings(config, {"connect/endpoints": connect + _endpoints(given.get("connect"))})
@@ -72,14 +81,14 @@ def main(argv: list[str] | None = None) -> int:
     given = parser.parse_args(argv)
     setup_logging()
     zenoh.init_log_from_env_or("error")
-    parent = os.getppid() if given.supervised else None
+    parent = Parent(os.environ) if given.supervised else None
     with Interrupts() as interrupts:
         status = _route(given, interrupts, parent)
     exit_now(status)
     return status
 
 
-def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None) -> int:
+def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | None) -> int:
     certificates = certificates_of()
     security = LinkSecurity(certificates, insecure=given.insecure, frames_stay=given.frames_stay)
     try:
@@ -105,20 +114,22 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: int | None
 
 
 def _watch_links(
-    session: zenoh.Session, listen: list[str], links: LinkWatch, interrupts: Interrupts, parent: int | None
+    session: zenoh.Session, listen: list[str], links: LinkWatch, interrupts: Interrupts, parent: Parent | None
 ) -> None:
-    manager, limit = Manager(os.environ if parent is None else {}), RateLimit()
+    manager, limit, look_s, linked = Manager(os.environ), RateLimit(), 0.0, False
     settle()
-    _tell_manager(manager, limit, "routing")
-    while not interrupts.wait(CHECK_S):
-        if parent is not None and os.getppid() != parent:
+    while not interrupts.requested():
+        if parent is not None and parent.gone():
             log.error("the supervisor is gone; stopping")
             _remove_socket_folders(listen)
             return
-        linked = bool(session.info.routers_zid())
-        for level, text in links.turn(linked, time.monotonic(), time.time()):
-            log.log(level, "%s", text)
+        if time.monotonic() >= look_s:
+            look_s = time.monotonic() + CHECK_S
+            linked = bool(session.info.routers_zid())
+            for level, text in links.turn(linked, time.monotonic(), time.time()):
+                log.log(level, "%s", text)
         _tell_manager(manager, limit, "linked" if linked else "no link to another router")
+        interrupts.wait(TURN_S)
 
 
 def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:

@@ -17,6 +17,7 @@ import zenoh
 from .certificates import VARIABLE, certificates_of
 from .endpoint import is_guarded
 from .finding import Finding
+from .leftovers import let_go
 from .tls import tls_settings
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -109,10 +110,15 @@ def close(session: zenoh.Session) -> None:
 
 
 def exit_now(status: int) -> None:
-    """Leave the process at once, after flushing: Rust threads of a session that would not close keep it alive otherwise."""
+    """Leave the process at once, after flushing: Rust threads of a session that would not close keep it alive otherwise.
+
+    What this process is the last to hold of Zenoh's shared memory goes with it.
+    """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):  # nobody reads any more, as in `deixis watch | head`
             stream.flush()
+    with contextlib.suppress(OSError):  # there is no /proc: then there is none of this to remove
+        let_go()
     os._exit(status)
 
 

@@ -28,6 +28,8 @@ from .liveliness import AliveStages
 from .manager import Manager
 from .memory import settle
 from .outputs import Publisher, oversize
+from .parent import Parent
+from .patient_puts import PatientPuts
 from .queries import Answer, EditQueue, Query, QueryQueue
 from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
@@ -47,7 +49,8 @@ MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 class Node:
     """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
 
-    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions) -> None:
+    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, alone: bool = True) -> None:
+        """`alone`: a robot has one process of this name, and it is said where there are more."""
         self.producer = Producer(stage, options.instance)
         self.robot = options.robot
         self.site = options.site
@@ -57,22 +60,25 @@ class Node:
         self.stopping = False
         self._session = session
         self._endpoint = options.connect
-        self._parent = os.getppid() if options.supervised else None
-        # Under our own supervisor the manager is the supervisor's, and hears the supervisor alone.
-        self._manager = Manager({} if options.supervised else os.environ)
+        self._parent = Parent(os.environ) if options.supervised else None
+        self._manager = Manager(os.environ)
         self._event = threading.Event()
         self._limit = RateLimit()
         self._logged_state: HealthState = "ok"
         self._heartbeat = Heartbeat(self.producer)
+        self._patient_puts = PatientPuts(self._go_on) if options.lockstep else None
         self._inputs: list[Subscription] = []
         self._outputs: list[Publisher] = []
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
         self._clocks: list[ClockWatch] = []
+        self._clock_of_frames: ClockWatch | None = None  # for ages only; said by who is asked to follow it
         certificates = certificates_of()
         self._certificate = CertificateWatch(certificates) if certificates is not None else None
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
+        self._alone = alone
+        self._doubles: set[str] = set()
         self._token: Any = None
         self._health = self.publish(topics.HEALTH)
         self.serve_get(topics.HEALTH, self._answer_health, stage=stage)
@@ -82,7 +88,10 @@ class Node:
     def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
         """Listen to a topic and keep its newest `depth` samples."""
         key = topic.key(self.robot)
-        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn, lockstep=self.lockstep)
+        clock = self._frames_clock() if topic is topics.FRAME else None
+        subscription: Subscription[Any] = Subscription(
+            topic, key, depth, self.wake, self.warn, lockstep=self.lockstep, clock=clock
+        )
         self._declared.append(self._session.declare_subscriber(key, subscription.store))
         self._inputs.append(subscription)
         return subscription
@@ -97,7 +106,7 @@ class Node:
     def publish(self, topic: Topic) -> Publisher:
         """A publisher of a topic of this stage."""
         key = topic.key(self.robot, stage=self.producer.stage)
-        publisher = Publisher(self._session, topic, key, self.warn, lossless=self.lockstep)
+        publisher = Publisher(self._session, topic, key, self.warn, lossless=self.lockstep, patient_puts=self._patient_puts)
         self._outputs.append(publisher)
         return publisher
 
@@ -139,7 +148,7 @@ class Node:
 
     def follow_readers(self, topic: Topic) -> Readers:
         """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
-        return Readers(self._session, self.robot, topic, self._alive, self._router)
+        return Readers(self._session, self.robot, topic, self.producer, self._alive, self._router)
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
@@ -159,8 +168,7 @@ class Node:
             self.wake()
         if self._heartbeat.due_in_s() == 0.0:
             self._beat()
-        self._tell_manager()
-        return not self.stopping
+        return self._go_on()
 
     def wake(self) -> None:
         """Make `wait` return; may be called from any thread."""
@@ -201,6 +209,10 @@ class Node:
         if name in counters or len(counters) < MAX_COUNTERS:
             counters[name] = counters.get(name, 0) + n
 
+    def count_to(self, name: str, total: int) -> None:
+        """Bring a counter of the health record up to what was counted elsewhere."""
+        self.count(name, total - self._heartbeat.counters.get(name, 0))
+
     def set_state(self, state: HealthState, reason: str = "") -> None:
         """Say in health whether the stage does its work, and log it where that changes."""
         self._heartbeat.state, self._heartbeat.reason = state, reason
@@ -230,12 +242,19 @@ class Node:
         self._look_at_queues()
         self._look_at_clocks()
         self._look_at_certificate()
+        if self._alone:
+            self._look_at_doubles()
         self._health.put(self._record())
-        if self._parent is not None and os.getppid() != self._parent:
-            self.log.error("the supervisor is gone; stopping")
-            self.stop()
         if not self._router():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
+
+    def _go_on(self) -> bool:
+        """Give a sign that the loop runs, and say whether it is to go on."""
+        self._tell_manager()
+        if self._parent is not None and self._parent.gone():
+            self.log.error("the supervisor is gone; stopping")
+            self.stop()
+        return not self.stopping
 
     def _tell_manager(self) -> None:
         heartbeat = self._heartbeat
@@ -262,7 +281,25 @@ class Node:
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
+    def _frames_clock(self) -> ClockWatch | None:
+        if self._clock_of_frames is None and not self.lockstep:
+            self._clock_of_frames = ClockWatch(self._session, self.robot, topics.FRAME.stage)
+        return self._clock_of_frames
+
+    def _look_at_doubles(self) -> None:
+        # At the second look only: the token of a predecessor that was killed may stand for a moment.
+        alive = {instance for stage, instance in self._alive.processes() if stage == self.producer.stage}
+        doubles, before = alive - {self.producer.instance}, self._doubles
+        self._doubles = doubles
+        stage, who = self.producer.stage, ", ".join(sorted(doubles & before))
+        text = f"{who} is {stage} of robot {self.robot}, too: what both publish is mixed; stop one of them" if who else None
+        self.note("doubles", text)
+        if text:
+            self.warn("doubles", text)
+
     def _look_at_clocks(self) -> None:
+        if self._clock_of_frames is not None:
+            self._clock_of_frames.turn()
         for watch in self._clocks:
             watch.turn()
             complaint = watch.complaint()

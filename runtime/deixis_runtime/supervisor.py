@@ -1,4 +1,4 @@
-"""Processes of one host: started, watched, restarted with a limit, stopped."""
+"""Processes of one host: started, restarted with a limit, stopped."""
 
 from __future__ import annotations
 
@@ -7,34 +7,41 @@ import os
 import signal
 import subprocess
 import time
-from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .launching import Child, start_process
+from .restarts import Restarts
 from .settings import STARTED_BEFORE
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE
 
 log = logging.getLogger("deixis-supervisor")
 
-RESTART_LIMIT = 5
-RESTART_WINDOW_S = 60.0
-BACKOFF_S = 0.5
-BACKOFF_MAX_S = 8.0
-STOP_TIMEOUT_S = 4.0
-KILL_TIMEOUT_S = 1.0
+STOP_TIMEOUT_S = 1.2
+KILL_TIMEOUT_S = 0.5
+SETTLED_S = 5.0
 SIGNALS = {number.value: number.name for number in signal.Signals}
 
 
 @dataclass
 class Process:
-    """One child: its command and how it has fared."""
+    """One child: its command and how it has fared.
+
+    needs: the one without which it cannot start. started: how often, of which all but the first were restarts. last_end: why it
+    ended last, in words, and ended_s when; killed_for: why we have killed it. given_up: why it is not started again.
+    """
 
     name: str
     argv: list[str]
+    needs: str | None = None
     popen: Child | None = None
-    restarts: deque[float] = field(default_factory=lambda: deque(maxlen=RESTART_LIMIT))
+    restarts: Restarts = field(default_factory=Restarts)
     started: int = 0
+    started_s: float = 0.0
     start_again_s: float | None = None
+    killed_for: str = ""
+    last_end: str = ""
+    ended_s: float = 0.0
     given_up: str = ""
 
     @property
@@ -44,45 +51,57 @@ class Process:
 
 
 class Supervisor:
-    """Holds the children. `poll` has to be called a few times a second."""
+    """Holds the children. `poll` has to be called several times a second."""
 
     def __init__(self) -> None:
         self.processes: dict[str, Process] = {}
+        self.environment: Mapping[str, str] = os.environ
         self.launch = start_process
 
-    def start(self, name: str, argv: list[str]) -> None:
+    def start(self, name: str, argv: list[str], needs: str | None = None) -> None:
         """Start a child. It gets its own session, so that Ctrl-C reaches the supervisor alone, which stops them in order."""
-        process = self.processes[name] = Process(name, argv)
+        process = self.processes[name] = Process(name, argv, needs)
         self._spawn(process)
 
     def poll(self) -> None:
-        """Notice children that ended and start them again, with a growing pause and a limit."""
+        """Notice children that ended and start them again, after a pause and with a limit: see `restarts`."""
+        now_s = time.monotonic()
         for process in self.processes.values():
             if process.given_up or process.running:
                 continue
             if process.start_again_s is None:
-                self._plan_restart(process)
-            elif time.monotonic() >= process.start_again_s:
+                self._plan_restart(process, now_s)
+            if process.start_again_s is not None and now_s >= process.start_again_s:
                 self._spawn(process)
+
+    def running(self) -> dict[str, int]:
+        """Process numbers by name of the children that run now."""
+        return {process.name: process.popen.pid for process in self.processes.values() if process.popen and process.running}
 
     def kill(self, name: str, why: str) -> None:
         """End a child that hangs; `poll` starts it again."""
         process = self.processes[name]
         if process.popen is not None and process.running:
             log.error("%s %s; killing it", name, why)
+            process.killed_for = why
             process.popen.kill()
+            self._await_killed(process.popen, name)
 
     def failed(self) -> dict[str, str]:
         """Children given up, with the reason."""
         return {process.name: process.given_up for process in self.processes.values() if process.given_up}
 
-    def stop(self) -> None:
-        """Stop all children: SIGTERM in reverse order of their start, SIGKILL for those that stay."""
+    def tell_to_stop(self) -> None:
+        """Send SIGTERM to all children, in reverse order of their start; `stop` waits for them."""
         for process in reversed(self.processes.values()):
             if process.popen is not None and process.running:
                 # A stopped process (SIGSTOP) would not see SIGTERM.
                 process.popen.send_signal(signal.SIGTERM)
                 process.popen.send_signal(signal.SIGCONT)
+
+    def stop(self) -> None:
+        """Stop all children: SIGTERM, and SIGKILL for those that stay."""
+        self.tell_to_stop()
         deadline = time.monotonic() + STOP_TIMEOUT_S
         for process in reversed(self.processes.values()):
             self._await_end(process, deadline)
@@ -105,30 +124,38 @@ class Supervisor:
 
     def _spawn(self, process: Process) -> None:
         process.start_again_s = None
-        environment = {**os.environ, STARTED_BEFORE: str(process.started)}
+        environment = {**self.environment, STARTED_BEFORE: str(process.started)}
         process.started += 1
+        process.started_s = time.monotonic()
         try:
             process.popen = self.launch(process.argv, environment)
         except OSError as error:
             process.given_up = f"it cannot be started: {error.strerror}"
             log.error("%s is given up: %s", process.name, process.given_up)
 
-    def _plan_restart(self, process: Process) -> None:
+    def _plan_restart(self, process: Process, now_s: float) -> None:
         assert process.popen is not None
-        status, now = process.popen.poll(), time.monotonic()
+        status = process.popen.poll()
         assert status is not None
+        process.last_end, process.ended_s = process.killed_for or say_status(status), now_s
+        process.killed_for = ""
         if status == EXIT_CONFIG:
             process.given_up = "its settings are wrong"
-        elif len(process.restarts) == RESTART_LIMIT and now - process.restarts[0] < RESTART_WINDOW_S:
-            ends, last = RESTART_LIMIT + 1, say_status(status)
-            process.given_up = f"it ended {ends} times within {RESTART_WINDOW_S:.0f} s, the last time by {last}"
+        else:
+            blameless = status == EXIT_UNREACHABLE and not self._settled(process.needs, now_s)
+            verdict = process.restarts.after(process.last_end, now_s, blameless=blameless)
+            process.given_up = verdict.given_up
         if process.given_up:
             log.error("%s is given up: %s", process.name, process.given_up)
             return
-        pause = min(BACKOFF_MAX_S, BACKOFF_S * 2 ** sum(now - at < RESTART_WINDOW_S for at in process.restarts))
-        process.restarts.append(now)
-        process.start_again_s = now + pause
-        log.warning("%s ended (%s); starting it again in %.1f s", process.name, say_status(status), pause)
+        process.start_again_s = now_s + verdict.pause_s
+        when = f"in {verdict.pause_s:.1f} s" if verdict.pause_s else "at once"
+        log.warning("%s ended (%s); starting it again %s", process.name, process.last_end, when)
+
+    def _settled(self, name: str | None, now_s: float) -> bool:
+        """Whether that child has run for a while: who does not reach it then has itself to blame."""
+        process = self.processes.get(name or "")
+        return process is None or (process.running and now_s - process.started_s > SETTLED_S)
 
 
 def say_status(status: int) -> str:

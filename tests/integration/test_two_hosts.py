@@ -10,7 +10,7 @@ from contextlib import ExitStack
 import pytest
 from running import CLIP, POINTED_AT, ROOT, SITE, command, tail, wait_until
 from site_made import add, make_site
-from two_hosts import TwoHosts, missing_for_two_hosts
+from two_hosts import TwoHosts, assert_each_frame_crosses_once, missing_for_two_hosts
 
 WHY_NOT = missing_for_two_hosts()
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
@@ -44,8 +44,16 @@ class RobotAndEdge:
 
     def answers(self):
         """Final answers so far."""
+        return [message for message in self._heard("Target") if message["final"]]
+
+    def newest_frame(self):
+        """Run and seq of the newest frame that was answered."""
+        belief = self._heard("Belief")[-1]
+        return belief["run"], belief["seq"]
+
+    def _heard(self, type_):
         heard = [json.loads(line) for line in self._watched.read_text().splitlines(keepends=True) if line.endswith("\n")]
-        return [line["message"] for line in heard if line["type"] == "Target" and line["message"]["final"]]
+        return [line["message"] for line in heard if line["type"] == type_]
 
     def wait_for_right_answer(self, after=0):
         """Wait for an answer beyond the first `after` that names the POI."""
@@ -85,11 +93,11 @@ def pair(hosts, tmp_path, robot):
     assert two.stop() == [0, 0, 0], "robot, edge and watch stop in good order"
 
 
-def test_the_poi_is_named_across_the_link(hosts, pair):
+def test_the_poi_is_named_across_the_link_and_each_frame_crosses_it_once(hosts, pair):
     hosts.link(delay_ms=5, jitter_ms=2)
     pair.start("bgr8", ("--connect", EDGE), ("--listen", "tcp/0.0.0.0:7447", "--insecure"))
     pair.wait_for_right_answer()
-    assert hosts.statistics.bytes > 50_000_000, "raw frames went over the link and not around it"
+    assert_each_frame_crosses_once(hosts, pair.newest_frame)
 
 
 def test_the_poi_is_named_by_mutual_tls_and_again_after_the_link_was_cut(hosts, pair, robot, tmp_path):

@@ -44,7 +44,7 @@ def test_a_process_that_is_stopped_is_killed_and_the_status_says_so(guarded):
     began = time.monotonic()
     assert guard.wait(20) == 128 + signal.SIGKILL
     assert time.monotonic() - began > 0.5
-    assert "gives no heartbeat for 1 s; killing it" in guard.stderr.read()
+    assert "gave no sign that its loop runs for 1 s; killing it" in guard.stderr.read()
 
 
 def test_a_process_that_never_says_that_it_is_ready_is_killed(guarded):
