@@ -18,6 +18,8 @@ from .leftovers import let_go
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_MS = 2000
+# A router that ended is back within half a second; Zenoh's own pauses between two tries are one second, two and four.
+RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 CLOSE_TIMEOUT_S = 3.0
 # A session that publishes a message of this size or more lays out 16 MB of shared memory for such. Below it shared memory is no
 # faster; Zenoh's own limit of 3 kB made a stage pay for a busy room's contours.
@@ -49,6 +51,7 @@ def client_config(endpoint: str, *, shared_memory: bool = True) -> zenoh.Config:
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("connect/timeout_ms", json.dumps(CONNECT_TIMEOUT_MS))
     config.insert_json5("connect/exit_on_failure", "true")
+    config.insert_json5("connect/retry", json.dumps(RETRY))
     return config
 
 
