@@ -15,7 +15,7 @@ FROM python:3.11-slim-bookworm
 ENV PYTHONUNBUFFERED=1 \
     # As deixis_runtime.environment has it.
     OPENBLAS_NUM_THREADS=1 \
-    # Two fresh buffers a frame cost hundreds of page faults where malloc gives large blocks back at once.
+    MALLOC_ARENA_MAX=1 \
     MALLOC_MMAP_THRESHOLD_=67108864 \
     MALLOC_TRIM_THRESHOLD_=134217728
 # What others wrote has a layer of its own, so that a change of ours is a small download. What is needed, and in which
@@ -32,7 +32,7 @@ RUN useradd --uid 10001 --no-create-home --home-dir /var/lib/deixis deixis \
 COPY config /etc/deixis
 WORKDIR /var/lib/deixis
 CMD ["python", "-m", "deixis_runtime.router", "--config", "/etc/deixis/edge.json5", \
-     "--listen", "unixsock-stream//run/deixis/router.sock", "--listen", "tcp/0.0.0.0:7447"]
+     "--listen", "unixsock-stream//run/deixis/router.sock"]
 ARG STAGES=
 RUN for stage in $STAGES; do set -- "$@" /wheels/deixis_$stage-*.whl; done; [ $# -eq 0 ] \
     || pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt "$@"

@@ -22,12 +22,13 @@ import struct
 import subprocess
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 TUNSETIFF, IFF_TUN, IFF_NO_PI = 0x400454CA, 0x0001, 0x1000
 POLL_S = 0.05
+VGA_BYTES = 640 * 480 * 3
 BURST = 64
 MAX_PACKET_BYTES = 65536
 
@@ -187,6 +188,28 @@ class TwoHosts:
             return
         self.statistics.forwarded += 1
         self.statistics.bytes += len(packet)
+
+
+def assert_each_frame_crosses_once(hosts: TwoHosts, newest: Callable[[], tuple[int, int]], frames: int = 30) -> None:
+    """Of raw VGA frames in lockstep; `newest` gives run and seq of the newest frame that the edge has said it has answered."""
+    run, first, sent = _just_said(hosts, newest)
+    now, last, sent_last = run, first, sent
+    while last - first < frames:
+        now, last, sent_last = _just_said(hosts, newest)
+        if now != run:  # the clip began anew
+            run, first, sent = now, last, sent_last
+    # Of the first and the last a part may be counted, and what else there is to say comes on top.
+    times = (sent_last - sent) / (last - first) / VGA_BYTES
+    assert 0.9 < times < 1.3, f"each frame crossed the link {times:.2f} times"
+
+
+def _just_said(hosts: TwoHosts, newest: Callable[[], tuple[int, int]]) -> tuple[int, int, int]:
+    """Run and seq as soon as they are new, and the bytes that had crossed the link."""
+    before, deadline = newest(), time.monotonic() + 60
+    while (said := newest()) == before:
+        assert time.monotonic() < deadline, "the edge answers no frames"
+        time.sleep(POLL_S / 5)
+    return *said, hosts.statistics.bytes
 
 
 def _burst(tun: int) -> list[bytes]:

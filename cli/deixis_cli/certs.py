@@ -10,7 +10,9 @@ from typing import Any
 
 from cryptography.hazmat.primitives import hashes
 from deixis_runtime.access import ROLES, ROUTERS, Member, member_of
-from deixis_runtime.certificates import SOON_DAYS
+from deixis_runtime.certificates import SOON_DAYS, Certificates
+from deixis_runtime.link_security import LinkSecurity, SecurityError, secure
+from deixis_runtime.session import base_config
 
 from . import authority
 from .options import CommandError, add_json
@@ -18,6 +20,8 @@ from .site_certificates import CA_KEY, CERTIFICATE, Held, SiteFolder, held_on_ho
 
 MAX_DAYS = 36500
 CA_DAYS, MEMBER_DAYS = 3650, 365
+# Of Zenoh's settings, those that ours set; a zenohd has its own defaults for the rest.
+SETTINGS = ("mode", "scouting", "listen", "connect", "transport", "access_control")
 RULE = "a name has 57 letters, digits, '_', '.' and '-' at most, and does not begin with '.' or '-'"
 
 
@@ -43,6 +47,11 @@ def register(subparsers: Any) -> None:
     revoke.add_argument("member", type=_member, metavar="ROLE:NAME", help="whose")
     frames = _action(actions, "frames", "say whether frames stay on the robots of the site", run_frames, "folder of the site")
     frames.add_argument("where", choices=("stay", "travel"))
+    zenohd = _action(actions, "zenohd", "print the settings of a stock zenohd for a host", run_zenohd, "a host's folder")
+    zenohd.add_argument(
+        "--config", type=Path, metavar="FILE", help="Zenoh settings (json5) to start from, e.g. config/edge.json5"
+    )
+    zenohd.add_argument("--frames-stay", action="store_true", help="let no frame leave this host (pictures of people)")
     show = _action(actions, "show", "who has which certificate, and until when", run_show, "folder of the site, or a host's")
     add_json(show, "print one JSON document")
 
@@ -97,6 +106,18 @@ def run_frames(given: argparse.Namespace) -> int:
     return 0
 
 
+def run_zenohd(given: argparse.Namespace) -> int:
+    """Print what our router would use, as one JSON document. Raises CommandError or Unreachable."""
+    security = LinkSecurity(Certificates(given.folder.resolve()), frames_stay=given.frames_stay)
+    config = base_config("router", given.config)
+    try:
+        secure(config, security, guarded=True)
+    except SecurityError as error:
+        raise CommandError(str(error)) from None
+    print(json.dumps({name: _set(json.loads(config.get_json(name))) for name in SETTINGS}, indent=1))
+    return 0
+
+
 def run_show(given: argparse.Namespace) -> int:
     """Show all certificates of a folder."""
     on_host = (given.folder / CERTIFICATE).exists()
@@ -146,6 +167,13 @@ def say_standing(item: dict[str, Any]) -> str:
         return f"not valid before {item['not_before'][:16]}"
     days = item["expires_in_days"]
     return f"expires in {days} day{'' if days == 1 else 's'}, {when}{': renew it' if item['standing'] == 'soon' else ''}"
+
+
+def _set(value: Any) -> Any:
+    """A setting without those in it that are not set."""
+    if isinstance(value, dict):
+        return {name: _set(item) for name, item in value.items() if item is not None}
+    return [_set(item) for item in value] if isinstance(value, list) else value
 
 
 def _say_list(site: SiteFolder, but: Member | None = None) -> None:

@@ -31,11 +31,13 @@ CLOCK_ADVICE = "ages are judged all the same, but stamps of the two are not comp
 class Listening:
     """What was heard by listening: healths by stage, and whether an edit by get reaches fusion (none: not tried).
 
-    `paths` are the topics listened to beside health, and whether anything came on each.
+    may_edit: our certificate, if we have one, is of a role that may edit. `paths` are the topics listened to beside health, and
+    whether anything came on each.
     """
 
     healths: frozenset[str]
     edits_reach_fusion: bool | None
+    may_edit: bool = True
     paths: Mapping[str, bool] = field(default_factory=dict)
 
 
@@ -45,6 +47,7 @@ def findings(system: System, listening: Listening) -> list[Finding]:
         *missing_stages(system),
         *hung_stages(system),
         *ill_stages(system),
+        *notes(system),
         *silenced(system, listening),
         *kept_from_us(system, listening),
         *unreadable(system),
@@ -94,7 +97,15 @@ def ill_stages(system: System) -> Iterator[Finding]:
             yield Finding("wrong", f"{process.stage}: {health.state}: {health.reason}")
         elif process.alive:
             yield Finding("ok", f"{process.stage}: ok, step {health.step_ms_p50:.1f} ms, {health.rss_mb:.0f} MB")
-        yield from (Finding("note", f"{process.stage}: {note}") for note in health.notes)
+
+
+def notes(system: System) -> Iterator[Finding]:
+    """Conditions that stages show. What several of them show, as of their host's certificate, is said once."""
+    found: dict[str, list[str]] = {}
+    for process in system.processes:
+        for note in process.health.notes if process.health else []:
+            found.setdefault(note, []).append(process.stage)
+    yield from (Finding("note", f"{', '.join(stages)}: {note}") for note, stages in found.items())
 
 
 def silenced(system: System, listening: Listening) -> Iterator[Finding]:
@@ -109,7 +120,9 @@ def silenced(system: System, listening: Listening) -> Iterator[Finding]:
         )
     if topics.STATE.stage in answering and system.state is None:
         yield Finding("wrong", "fusion/state: a get is not answered", "access control on the way denies it")
-    if listening.edits_reach_fusion is False:
+    if listening.edits_reach_fusion is False and not listening.may_edit:
+        yield Finding("note", "fusion/poi: our gets on it do not reach fusion", "as meant: our certificate is not an editor's")
+    elif listening.edits_reach_fusion is False:
         yield Finding("wrong", "fusion/poi: an edit by get does not reach fusion", "access control on the way denies it")
 
 

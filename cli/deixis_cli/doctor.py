@@ -8,10 +8,11 @@ import time
 from typing import Any
 
 import zenoh
+from deixis_runtime.certificate_check import who_may_not_edit
 from deixis_runtime.certificates import certificates_of
-from deixis_runtime.endpoint import why_unanswered
 from deixis_runtime.finding import Finding
 from deixis_runtime.session import Unreachable, open_client
+from deixis_runtime.unanswered import why_unanswered
 from deixis_schemas import topics
 from deixis_schemas.messages import Health, Poi
 from deixis_schemas.topics import By, Delivery
@@ -60,8 +61,8 @@ def examine(endpoint: str, robot: str) -> list[Finding]:
     try:
         with open_client(endpoint, shared_memory=False) as session:
             return [Finding("ok", f"the router at {endpoint} answers"), *_examine(session, robot)]
-    except Unreachable:
-        return [why_unanswered(endpoint, certificates_of())]
+    except Unreachable as error:
+        return [error.why or why_unanswered(endpoint, certificates_of())]
 
 
 def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
@@ -82,7 +83,8 @@ def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
     healths = frozenset(item.message.stage for item in received if isinstance(item.message, Health))
     # What came and breaks the contract did come: it is no silence.
     heard = {item.key for item in received} | inbox.rejections.keys()
-    return findings(system, Listening(healths, reach, {topic.path: topic.key(robot) in heard for topic in LISTENED}))
+    paths = {topic.path: topic.key(robot) in heard for topic in LISTENED}
+    return findings(system, Listening(healths, reach, who_may_not_edit(certificates_of()) is None, paths))
 
 
 def edits_reach_fusion(session: zenoh.Session, robot: str) -> bool:

@@ -11,7 +11,7 @@ import zenoh
 from deixis_runtime.clock_offset import Exchange
 from deixis_runtime.delivery import GET_PRIORITY
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import Health, Message, Poi, State
+from deixis_schemas.messages import MAX_POIS, Health, Message, Poi, State
 
 from .raw_message import RawMessage
 
@@ -65,20 +65,23 @@ def get_raw(session: zenoh.Session, selector: str, timeout_s: float = TIMEOUT_S)
     return [RawMessage(str(s.key_expr), str(s.encoding), s.payload.to_bytes(), time.time_ns()) for s in sent]
 
 
-def get_state(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) -> State | None:
-    """What fusion knows; none where it does not answer."""
-    states, _ = get_all(session, topics.STATE.key(robot), State, timeout_s=timeout_s)
+def get_state(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S, *, rows: int | None = None) -> State | None:
+    """What fusion knows, with the first so many `rows` of its lists; none where it does not answer."""
+    selector = topics.STATE.key(robot) + ("" if rows is None else f"?top={rows}")
+    states, _ = get_all(session, selector, State, timeout_s=timeout_s)
     return states[0][1] if states else None
 
 
 def get_pois(session: zenoh.Session, robot: str, poi_id: str = "**", timeout_s: float = TIMEOUT_S) -> list[Poi] | None:
     """All POIs by id, or the one of this id; none where fusion does not answer.
 
-    No reply comes from an empty registry and from an absent fusion alike, so then its state is asked.
+    No reply comes from an empty registry and from an absent fusion alike, so then its state is asked. That also names the
+    POIs, up to MAX_POIS, for viewers: access control denies them gets on POIs, which may be edits.
     """
     found, _ = get_all(session, topics.POI.key(robot, id=poi_id), Poi, timeout_s=timeout_s)
-    if not found and get_state(session, robot, timeout_s) is None:
-        return None
+    if not found:
+        state = get_state(session, robot, timeout_s, rows=MAX_POIS)
+        return None if state is None else [poi for poi in state.pois if poi_id in ("**", poi.poi_id)]
     return sorted((poi for _, poi in found), key=lambda poi: poi.poi_id)
 
 

@@ -6,7 +6,9 @@ import argparse
 import logging
 from pathlib import Path
 
+from deixis_runtime.certificates import add_certificates, certificates_of
 from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
+from deixis_runtime.link_security import LinkSecurity
 from deixis_runtime.session import DEFAULT_ENDPOINT
 from deixis_runtime.settings import checked_name
 from deixis_runtime.site import Site, SiteError, load_site
@@ -32,6 +34,7 @@ def add_connect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router of the system (default: %(default)s)"
     )
+    add_certificates(parser)
 
 
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
@@ -48,6 +51,9 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         help=f"where others reach this host's router; may be given again (default: {DEFAULT_ENDPOINT})",
     )
+    add_certificates(parser)
+    parser.add_argument("--insecure", action="store_true", help="listen on the network without TLS all the same")
+    parser.add_argument("--frames-stay", action="store_true", help="let no frame leave this host (pictures of people)")
     parser.add_argument("--only", action="append", default=[], metavar="STAGES", help="start these stages only, e.g. camera")
     parser.add_argument("--except", action="append", default=[], dest="without", metavar="STAGES", help="start all but these")
     parser.add_argument(
@@ -87,8 +93,17 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
             raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
     site = given.site.resolve() if given.site is not None else None
     listen = tuple(given.listen or (DEFAULT_ENDPOINT,))
-    fork = not given.no_fork
-    return HostOptions(robot=given.robot, stages=stages, site=site, listen=listen, sets=sets, fork=fork, **others)  # type: ignore[arg-type]
+    security = LinkSecurity(certificates_of(), insecure=given.insecure, frames_stay=given.frames_stay)
+    return HostOptions(
+        robot=given.robot,
+        stages=stages,
+        site=site,
+        listen=listen,
+        sets=sets,
+        security=security,
+        fork=not given.no_fork,
+        **others,  # type: ignore[arg-type]
+    )
 
 
 def stage_settings(items: list[str]) -> dict[str, tuple[str, ...]]:

@@ -14,7 +14,6 @@ import zenoh
 from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
-from deixis_runtime.supervisor_health import STAGE as SUPERVISOR
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
@@ -186,7 +185,7 @@ class Playback:
         if message is None:
             return
         self._counts[type(message).__name__] += 1
-        if isinstance(message, Health) and message.stage != SUPERVISOR:
+        if isinstance(message, Health) and message.stage != topics.SUPERVISOR:
             self.result.health[message.stage] = message
         if isinstance(message, Target) and message.final:
             self._targets.append(message)
@@ -207,7 +206,7 @@ class Playback:
         if topics.POI.stage in self._options.stages:
             self.result.names = get_names(host.session, self._options.robot)
         for health in get_healths(host.session, self._options.robot):
-            if health.stage != SUPERVISOR:  # it is we, and say in `failure` what is worth saying
+            if health.stage != topics.SUPERVISOR:  # it is we, and say in `failure` what is worth saying
                 self.result.health[health.stage] = health
 
     def _ended(self) -> bool:

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
+from deixis_runtime.certificate_check import who_may_not_edit
+from deixis_runtime.certificates import certificates_of
 from deixis_runtime.poi_files import load_pois
 from deixis_runtime.session import open_client
 from deixis_runtime.settings import checked_name
@@ -166,6 +168,10 @@ def _pois(session: zenoh.Session, given: argparse.Namespace, which: str = "**") 
 
 
 def _nobody(given: argparse.Namespace) -> str:
+    # Access control denies without a word.
+    ours = who_may_not_edit(certificates_of())
+    if ours is not None:
+        return f"fusion of robot '{given.robot}' does not answer at {given.connect}: the certificate {ours} is not an editor's"
     return f"fusion of robot '{given.robot}' does not answer at {given.connect}; 'deixis doctor' tells why"
 
 

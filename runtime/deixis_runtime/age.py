@@ -21,10 +21,13 @@ class RelativeAge:
         self._shortest_ns: int | None = None
         self._shortest_before_ns: int | None = None
 
-    def note(self, run: int, seq: int, stamp_ns: int, received_ns: int) -> None:
-        """A message came: its frame's `run`, `seq` and stamp (the sender's clock), and when (our monotonic clock)."""
-        clock_set_back = seq > self._seq and stamp_ns < self._stamp_ns
-        if run != self._run or clock_set_back:
+    def note(self, run: int, seq: int, stamp_ns: int, received_ns: int) -> bool:
+        """A message came: its frame's `run`, `seq` and stamp (the sender's clock), and when (our monotonic clock).
+
+        True where it shows that the sender's clock was set back.
+        """
+        clock_set_back = run == self._run and seq > self._seq and stamp_ns < self._stamp_ns
+        if run != self._run or clock_set_back:  # another run may be one of another clock
             self._shortest_ns = self._shortest_before_ns = None
             self._bucket_began_ns = received_ns
         elif received_ns - self._bucket_began_ns >= BUCKET_NS:
@@ -33,6 +36,7 @@ class RelativeAge:
         self._run, self._seq, self._stamp_ns = run, seq, stamp_ns
         delay_ns = received_ns - stamp_ns
         self._shortest_ns = delay_ns if self._shortest_ns is None else min(self._shortest_ns, delay_ns)
+        return clock_set_back
 
     def age_s(self, stamp_ns: int, now_ns: int) -> float:
         """Age at `now_ns` of a message that was noted, seconds."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .access import Member, member_of
+from .access import EDITORS, Member, member_of
 from .certificates import SOON_DAYS, Certificates
 from .clock_watch import say_seconds
 from .finding import Finding
@@ -95,6 +95,17 @@ def examine(certificates: Certificates, now_s: float) -> Finding:
         return standing(read(certificates), now_s)
     except CertificateError as error:
         return Finding("wrong", str(error), "make it anew with 'deixis certs', or name another folder in DEIXIS_CERTS")
+
+
+def who_may_not_edit(certificates: Certificates | None) -> Member | None:
+    """Whose certificate this is, where access control means it not to edit POIs. Without one we are of the host itself."""
+    if certificates is None:
+        return None
+    try:
+        member = read(certificates).member
+    except CertificateError:
+        return None  # said where the folder itself is examined
+    return member if member is not None and member.role not in EDITORS else None
 
 
 def _context(protocol: int, certificates: Certificates) -> ssl.SSLContext:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 VARIABLE = "DEIXIS_CERTS"
 SOON_DAYS = 30
@@ -43,3 +45,24 @@ def certificates_of(environment: Mapping[str, str] = os.environ) -> Certificates
     """The folder that the environment names; None where it names none."""
     folder = environment.get(VARIABLE)
     return Certificates(Path(folder)) if folder else None
+
+
+def add_certificates(parser: argparse.ArgumentParser) -> None:
+    """--certs, which sets the environment variable: so it holds for the processes that this one starts, too."""
+    parser.add_argument(
+        "--certs",
+        action=_IntoEnvironment,
+        metavar="DIR",
+        help=f"folder with the certificate of this host or person, as 'deixis certs' makes it (default: ${VARIABLE})",
+    )
+
+
+class _IntoEnvironment(argparse.Action):
+    def __call__(
+        self,
+        _parser: argparse.ArgumentParser,
+        _given: argparse.Namespace,
+        value: str | Sequence[Any] | None,
+        _name: str | None = None,
+    ) -> None:
+        os.environ[VARIABLE] = str(Path(str(value)).resolve())

@@ -93,6 +93,11 @@ class ClockOffset:
         return Offset(best.ahead_ns, _uncertain_ns(best, now_ns))
 
 
+def surely_passed_ns(stamp_ns: int, now_ns: int, offset: Offset) -> int:
+    """How long ago a stamp of the other clock is at least, at `now_ns` of our monotonic clock, beside which `offset` is."""
+    return now_ns + offset.ahead_ns - offset.uncertain_ns - stamp_ns
+
+
 def estimate(exchanges: Iterable[Exchange]) -> Offset | None:
     """The offset by a few exchanges, at the end of the last one. None where there are none."""
     offset = ClockOffset()

@@ -11,7 +11,7 @@ import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import ClockHealth, Health
 
-from .clock_offset import ClockOffset, Exchange, Offset
+from .clock_offset import ClockOffset, Exchange, Offset, surely_passed_ns
 from .delivery import GET_PRIORITY
 
 TIMEOUT_S = 1.9
@@ -43,6 +43,15 @@ class ClockWatch:
         now_ns = time.monotonic_ns()
         offset = self._offset.at(now_ns)
         return None if offset is None else offset.beside(time.time_ns() - now_ns)
+
+    def age_ns(self, stamp_ns: int, now_ns: int) -> int | None:
+        """How long ago a stamp of the stage's clock is at least, at `now_ns` of our monotonic clock. None as in `offset`."""
+        offset = self._offset.at(now_ns)
+        return None if offset is None else surely_passed_ns(stamp_ns, now_ns, offset)
+
+    def forget(self) -> None:
+        """The stage's clock was set: what was known of it is wrong until it has answered again."""
+        self._offset.forget()
 
     def health(self) -> ClockHealth | None:
         """What is known, for the health record."""

@@ -20,15 +20,16 @@ from deixis_schemas import topics
 from .hang_watch import HangWatch
 from .launching import Forkable, ForkServer
 from .leftovers import Leftovers, remove_unused
+from .link_security import LinkSecurity, SecurityError
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
 from .procfs import locked_inodes
-from .router import SOCKET_FOLDER_PREFIX
-from .session import DEFAULT_ENDPOINT, open_client
+from .router import SOCKET_FOLDER_PREFIX, router_config
+from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
 from .stage import Node
 from .supervisor import Supervisor
-from .supervisor_health import STAGE, account_of
+from .supervisor_health import account_of
 from .watchdog import Patience
 
 log = logging.getLogger("deixis-supervisor")
@@ -47,7 +48,10 @@ class HostFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class HostOptions:
-    """What runs on a host and where it is reached. fork: its processes are forked from one that has done their imports."""
+    """What runs on a host, where it is reached, and how its links are guarded.
+
+    fork: its processes are forked from one that has done their imports.
+    """
 
     robot: str
     stages: tuple[str, ...]
@@ -55,6 +59,7 @@ class HostOptions:
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     connect: tuple[str, ...] = ()
     zenoh_config: Path | None = None
+    security: LinkSecurity = field(default_factory=LinkSecurity)
     lockstep: bool = False
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
@@ -185,6 +190,11 @@ class Host:
         ]
 
     def _start_router(self) -> None:
+        options = self.options
+        try:  # before anything starts, so that the reason is the last that is said
+            router_config(list(options.listen), list(options.connect), options.zenoh_config, options.security)
+        except (SecurityError, Unreachable) as error:
+            raise HostFailed(str(error)) from None
         command = [*ROUTER_COMMAND, "--supervised", "--listen", self.endpoint]
         for endpoint in self.options.listen:
             command += ["--listen", endpoint]
@@ -192,11 +202,13 @@ class Host:
             command += ["--connect", endpoint]
         if self.options.zenoh_config:
             command += ["--config", str(self.options.zenoh_config)]
+        command += ["--insecure"] if options.security.insecure else []
+        command += ["--frames-stay"] if options.security.frames_stay else []
         self.supervisor.start(ROUTER, command)
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._node = Node(self.session, STAGE, self._node_options(), alone=False)
+        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), alone=False)
 
     def _node_options(self) -> CommonOptions:
         options = self.options

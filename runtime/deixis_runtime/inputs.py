@@ -14,6 +14,7 @@ from deixis_schemas.messages import InputHealth, Message, OfFrame, Produced
 from deixis_schemas.topics import Topic
 
 from .age import RelativeAge
+from .clock_watch import ClockWatch
 from .rate import Rate
 
 T = TypeVar("T", bound=Message)
@@ -40,8 +41,9 @@ class Subscription(Generic[T]):
         report: Callable[[str, str], None],
         *,
         lockstep: bool = False,
+        clock: ClockWatch | None = None,
     ) -> None:
-        """In `lockstep` no age is judged: time is that of the frames, which wait for us."""
+        """In `lockstep` no age is judged: time is that of the frames, which wait for us. `clock`: the one of the stamps."""
         self.topic = topic
         self.key = key
         self.received = 0
@@ -61,6 +63,7 @@ class Subscription(Generic[T]):
         self._rate = Rate(time.monotonic())
         self._max_age_s = None if lockstep else topic.max_age_s
         self._age = RelativeAge()
+        self._clock = clock
         self._of_last_look = (0, 0)
 
     def store(self, sample: zenoh.Sample) -> None:
@@ -169,7 +172,9 @@ class Subscription(Generic[T]):
         # All are noted before the first is judged: the newest of a backlog tells how old the others are.
         for received_ns, message in messages:
             if isinstance(message, OfFrame):
-                self._age.note(message.run, message.seq, message.stamp_ns, received_ns)
+                set_back = self._age.note(message.run, message.seq, message.stamp_ns, received_ns)
+                if set_back and self._clock is not None:
+                    self._clock.forget()
         now_ns = time.monotonic_ns()
         aged = [(self._age_s(message, now_ns), message) for _, message in messages]
         young = [message for age_s, message in aged if age_s <= limit_s]
@@ -180,7 +185,12 @@ class Subscription(Generic[T]):
         return young
 
     def _age_s(self, message: T, now_ns: int) -> float:
-        return self._age.age_s(message.stamp_ns, now_ns) if isinstance(message, OfFrame) else 0.0
+        if not isinstance(message, OfFrame):
+            return 0.0
+        # Beside the quickest one, a backlog shows at once, whatever the clocks; one that has stood for long, as before a full
+        # link, shows by the clocks alone.
+        by_clock_ns = None if self._clock is None else self._clock.age_ns(message.stamp_ns, now_ns)
+        return max(self._age.age_s(message.stamp_ns, now_ns), (by_clock_ns or 0) / 1e9)
 
     def _hear(self, key: str, who: str) -> None:
         now = time.monotonic()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import zenoh
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import Health
+from deixis_schemas.messages import Health, Producer
 from deixis_schemas.topics import Topic
 
 from .delivery import GET_PRIORITY
@@ -41,11 +41,19 @@ class Readers:
     """The stages that listen to one topic. The callback only keeps answers; decoding happens in `turn`, in the loop."""
 
     def __init__(
-        self, session: zenoh.Session, robot: str, topic: Topic, alive: AliveStages, our_router: Callable[[], str]
+        self,
+        session: zenoh.Session,
+        robot: str,
+        topic: Topic,
+        us: Producer,
+        alive: AliveStages,
+        our_router: Callable[[], str],
     ) -> None:
+        """Of `topic` of a robot; `us` is who asks and needs no answer."""
         self._session = session
         self._selector = topics.HEALTH.key(robot, stage="*")
         self._key = topic.key(robot)
+        self._us = us
         self._alive = alive
         self._our_router = our_router
         self._lock = threading.Lock()
@@ -58,7 +66,7 @@ class Readers:
     def turn(self) -> None:
         """Take in what was answered; ask now and then, and where a process is new."""
         now_s = time.monotonic()
-        processes = self._alive.processes()
+        processes = self._alive.processes() - {self._us}
         new = processes - self._first_seen_s.keys()
         self._first_seen_s = {who: self._first_seen_s.get(who, now_s) for who in processes}
         self._answered &= processes

@@ -14,7 +14,11 @@ from typing import Any
 
 import zenoh
 
+from .certificates import VARIABLE, certificates_of
+from .endpoint import is_guarded
+from .finding import Finding
 from .leftovers import let_go
+from .tls import tls_settings
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_MS = 2000
@@ -27,7 +31,11 @@ SHARED_FROM_BYTES = 65_536
 
 
 class Unreachable(ConnectionError):
-    """No router answers at the endpoint; the text names it."""
+    """No router answers at the endpoint; the text names it. why: what was found by looking into it, if that was done."""
+
+    def __init__(self, text: str, why: Finding | None = None) -> None:
+        super().__init__(text)
+        self.why = why
 
 
 def base_config(mode: str, file: Path | None = None) -> zenoh.Config:
@@ -44,7 +52,7 @@ def base_config(mode: str, file: Path | None = None) -> zenoh.Config:
 
 
 def client_config(endpoint: str, *, shared_memory: bool = True) -> zenoh.Config:
-    """Configuration of a client of the router at `endpoint`."""
+    """Configuration of a client of the router at `endpoint`, with the certificates that the environment names."""
     config = base_config("client")
     config.insert_json5("transport/shared_memory/enabled", json.dumps(shared_memory))
     config.insert_json5("transport/shared_memory/transport_optimization/message_size_threshold", str(SHARED_FROM_BYTES))
@@ -52,6 +60,9 @@ def client_config(endpoint: str, *, shared_memory: bool = True) -> zenoh.Config:
     config.insert_json5("connect/timeout_ms", json.dumps(CONNECT_TIMEOUT_MS))
     config.insert_json5("connect/exit_on_failure", "true")
     config.insert_json5("connect/retry", json.dumps(RETRY))
+    certificates = certificates_of()
+    if certificates is not None and is_guarded(endpoint):
+        put_settings(config, {f"transport/link/tls/{name}": value for name, value in tls_settings(certificates).items()})
     return config
 
 
@@ -65,17 +76,28 @@ def open_client(endpoint: str, *, shared_memory: bool = True) -> Iterator[zenoh.
     never exits, so sessions are opened here and nowhere else.
     """
     zenoh.init_log_from_env_or("error")
+    if is_guarded(endpoint) and certificates_of() is None:
+        raise Unreachable(f"{endpoint}: TLS needs a certificate: name the folder of yours with --certs or in {VARIABLE}")
     try:
         session = zenoh.open(client_config(endpoint, shared_memory=shared_memory))
     except zenoh.ZError as error:
-        raise Unreachable(
-            f"no Zenoh router answers at {endpoint} ({first_line(error)}); start one with 'deixis run' or 'deixis up', "
-            f"or name another with --connect"
-        ) from None
+        raise _unreachable(endpoint, first_line(error)) from None
     try:
         yield session
     finally:
         close(session)
+
+
+def _unreachable(endpoint: str, said: str) -> Unreachable:
+    """Zenoh says only that the time is over where a certificate is refused, or one side speaks TLS and the other does not."""
+    # Here, for it needs `ssl`, and a session that opens does not.
+    from .unanswered import wants_tls, why_unanswered  # noqa: PLC0415
+
+    why = why_unanswered(endpoint, certificates_of()) if is_guarded(endpoint) else wants_tls(endpoint)
+    if why is None:
+        advice = "start one with 'deixis run' or 'deixis up', or name another with --connect"
+        return Unreachable(f"no Zenoh router answers at {endpoint} ({said}); {advice}")
+    return Unreachable(f"no session with {endpoint}: {why.what}{f'; {why.advice}' if why.advice else ''}", why)
 
 
 def close(session: zenoh.Session) -> None:

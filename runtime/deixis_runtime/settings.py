@@ -16,6 +16,7 @@ from deixis_schemas.codec import say
 from deixis_schemas.messages import NAME_PATTERN
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from .certificates import add_certificates
 from .session import DEFAULT_ENDPOINT
 from .site import Site, SiteError, load_site
 
@@ -58,6 +59,7 @@ def parse_options(stage: str, description: str, argv: list[str] | None) -> Commo
     parser = argparse.ArgumentParser(prog=f"deixis-{stage}", description=description)
     parser.add_argument("--robot", required=True, type=checked_name, help="name of the robot, the second part of every key")
     parser.add_argument("--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (default: %(default)s)")
+    add_certificates(parser)
     parser.add_argument("--site", type=Path, metavar="FILE", help="site file: camera, walls, points of interest, settings")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="sets", help="override one setting")
     parser.add_argument("--instance", type=checked_name, help="name of this process (default: host and process number)")

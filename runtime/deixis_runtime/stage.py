@@ -17,11 +17,13 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import Health, HealthState, Message, Producer
 from deixis_schemas.topics import Topic
 
+from .certificates import certificates_of
 from .clock_watch import ClockWatch
 from .delivery import PROFILES
 from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
+from .link_watch import CertificateWatch, say
 from .liveliness import AliveStages
 from .manager import Manager
 from .memory import settle
@@ -70,6 +72,9 @@ class Node:
         self._queries: list[QueryQueue] = []
         self._edits: list[EditQueue] = []
         self._clocks: list[ClockWatch] = []
+        self._clock_of_frames: ClockWatch | None = None  # for ages only; said by who is asked to follow it
+        certificates = certificates_of()
+        self._certificate = CertificateWatch(certificates) if certificates is not None else None
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._alone = alone
@@ -83,7 +88,10 @@ class Node:
     def subscribe(self, topic: Topic, depth: int = 1) -> Subscription[Any]:
         """Listen to a topic and keep its newest `depth` samples."""
         key = topic.key(self.robot)
-        subscription: Subscription[Any] = Subscription(topic, key, depth, self.wake, self.warn, lockstep=self.lockstep)
+        clock = self._frames_clock() if topic is topics.FRAME else None
+        subscription: Subscription[Any] = Subscription(
+            topic, key, depth, self.wake, self.warn, lockstep=self.lockstep, clock=clock
+        )
         self._declared.append(self._session.declare_subscriber(key, subscription.store))
         self._inputs.append(subscription)
         return subscription
@@ -140,7 +148,7 @@ class Node:
 
     def follow_readers(self, topic: Topic) -> Readers:
         """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
-        return Readers(self._session, self.robot, topic, self._alive, self._router)
+        return Readers(self._session, self.robot, topic, self.producer, self._alive, self._router)
 
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
@@ -233,6 +241,7 @@ class Node:
         self._log_state()
         self._look_at_queues()
         self._look_at_clocks()
+        self._look_at_certificate()
         if self._alone:
             self._look_at_doubles()
         self._health.put(self._record())
@@ -272,6 +281,11 @@ class Node:
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
         self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
+    def _frames_clock(self) -> ClockWatch | None:
+        if self._clock_of_frames is None and not self.lockstep:
+            self._clock_of_frames = ClockWatch(self._session, self.robot, topics.FRAME.stage)
+        return self._clock_of_frames
+
     def _look_at_doubles(self) -> None:
         # At the second look only: the token of a predecessor that was killed may stand for a moment.
         alive = {instance for stage, instance in self._alive.processes() if stage == self.producer.stage}
@@ -284,12 +298,23 @@ class Node:
             self.warn("doubles", text)
 
     def _look_at_clocks(self) -> None:
+        if self._clock_of_frames is not None:
+            self._clock_of_frames.turn()
         for watch in self._clocks:
             watch.turn()
             complaint = watch.complaint()
             self.note(f"clock {watch.stage}", complaint)
             if complaint:
                 self.warn(f"clock {watch.stage}", f"{watch.key}: {complaint}; run NTP or chrony on both")
+
+    def _look_at_certificate(self) -> None:
+        """That of this host, which its router uses: the router itself has no health to say it in."""
+        if self._certificate is None:
+            return
+        found = self._certificate.turn(time.monotonic(), time.time())
+        self.note("certificate", self._certificate.complaint)
+        if found is not None:
+            self.warn("certificate", say(found))
 
     def _look_at_queues(self) -> None:
         """What was lost or dropped before the stage saw it is said in health."""

@@ -83,6 +83,9 @@ TOPICS: tuple[Topic, ...] = (
 # The stages that every frame passes, in their order: a row of the table makes one.
 STAGES = tuple(dict.fromkeys(topic.stage for topic in TOPICS if topic.by is By.FRAME))
 
+SUPERVISOR = "supervisor"
+"""The name, in place of a stage's, of the process that starts a host's stages: its health says how they fare."""
+
 
 def alive_key(robot: str, stage: str, instance: str) -> str:
     """Liveliness token of one process of a stage."""

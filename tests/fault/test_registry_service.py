@@ -29,25 +29,42 @@ def bench(endpoint: str, tmp_path: Path) -> Iterator[Bench]:
         yield it
 
 
-def test_no_acknowledged_edit_is_lost_when_the_stage_is_killed_in_the_middle(bench: Bench) -> None:
-    bench.start()
+def edit_until_killed(bench: Bench, numbers: Iterator[int]) -> dict[str, float]:
+    """Edits, one after the other, until the stage dies of SIGKILL; the last x of each POI that was acknowledged."""
     acknowledged: dict[str, float] = {}
     assert bench.process is not None
-    killer = threading.Timer(0.5, bench.process.kill)
+    killer = threading.Timer(0.4, bench.process.kill)
     killer.start()
-    for i in range(100_000):
-        if bench.process.poll() is not None:
-            break
-        replies = bench.replies(f"fusion/poi/p{i % 25}", json.dumps({"position_m": [i, 0, 0]}).encode(), "application/json")
-        if replies and replies[0].ok is not None:
-            acknowledged[f"p{i % 25}"] = float(i)
+    while bench.process.poll() is None:
+        x = float(next(numbers))
+        at = {"position_m": [x, 0, 0]}
+        if x % 2:
+            pois, replies = [f"p{x % 24:.0f}"], bench.replies(f"fusion/poi/p{x % 24:.0f}", json.dumps(at).encode(), codec.JSON)
+        else:
+            pois = ["left", "right"]
+            both = json.dumps(dict.fromkeys(pois, at)).encode()
+            replies = bench.replies("fusion/poi/*?op=put_all", both, codec.JSON)
+        if any(reply.ok is not None for reply in replies):
+            acknowledged |= dict.fromkeys(pois, x)
     killer.join()
     assert bench.process.wait(10) == -signal.SIGKILL
-    assert len(acknowledged) > 5
+    return acknowledged
+
+
+def test_no_acknowledged_edit_is_lost_and_none_is_half_made_when_the_stage_is_killed_in_the_middle(bench: Bench) -> None:
+    numbers = iter(range(1_000_000))
+    acknowledged: dict[str, float] = {}
+    for _ in range(3):
+        bench.start()
+        taken = edit_until_killed(bench, numbers)
+        assert len(taken) > 2
+        acknowledged |= taken
     bench.start()
     stored = {poi.poi_id: poi.position_m[0] for poi in bench.state("?top=1024").pois}
+    assert stored["left"] == stored["right"]
     assert all(stored[poi_id] >= x for poi_id, x in acknowledged.items())
-    assert sum(stored[poi_id] != x for poi_id, x in acknowledged.items()) <= 1
+    # Killed between commit and acknowledgement, it is ahead of what it said: by one edit of each life.
+    assert len({stored[poi_id] for poi_id in stored if stored[poi_id] != acknowledged.get(poi_id)}) <= 3
     assert bench.stop() == 0
 
 

@@ -9,15 +9,17 @@ from contextlib import ExitStack
 
 import pytest
 from running import CLIP, POINTED_AT, ROOT, SITE, command, tail, wait_until
-from two_hosts import TwoHosts, missing_for_two_hosts
+from site_made import add, make_site
+from two_hosts import TwoHosts, assert_each_frame_crosses_once, missing_for_two_hosts
 
 WHY_NOT = missing_for_two_hosts()
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
 
 PATIENCE_S = 90.0
-EDGE = "tcp/10.77.0.2:7447"
+ADDRESS = "10.77.0.2"
+EDGE, GUARDED_EDGE = f"tcp/{ADDRESS}:7447", f"tls/{ADDRESS}:7448"
 # Answers and tracks have a connection of their own, so that they do not queue behind frames.
-TWO_LINKS = ("--connect", f"{EDGE}?prio=1-4#so_sndbuf=65536", "--connect", f"{EDGE}?prio=5-7#so_sndbuf=65536")
+TWO_LINKS = tuple(part for prio in ("1-4", "5-7") for part in ("--connect", f"{GUARDED_EDGE}?prio={prio}#so_sndbuf=65536"))
 
 
 class RobotAndEdge:
@@ -29,22 +31,29 @@ class RobotAndEdge:
         self._watched = folder / "watch"
         self._open = ExitStack()
 
-    def start(self, encoding, connect):
+    def start(self, encoding, connect, listen):
         """The robot first: it has to wait for the edge."""
         camera = {"source": CLIP, "loop": "true", "encoding": encoding}
         sets = [part for name, value in camera.items() for part in ("--set", f"camera.{name}={value}")]
         config = ROOT / "config"
         self._up("robot", "--only", "camera", *connect, "--zenoh-config", config / "robot.json5", *sets)
         registry = ["--registry", self.folder / "pois.sqlite"]
-        listen = ["--listen", "tcp/0.0.0.0:7447"]
         self._up("edge", "--except", "camera", *listen, "--zenoh-config", config / "edge.json5", *registry)
         wait_until(lambda: "started, reached at" in tail(self.folder / "edge"), "the edge", PATIENCE_S, self.folder / "edge")
         self._start("edge", "watch", command("deixis", "watch", "--robot", self.robot, "--json"))
 
     def answers(self):
         """Final answers so far."""
+        return [message for message in self._heard("Target") if message["final"]]
+
+    def newest_frame(self):
+        """Run and seq of the newest frame that was answered."""
+        belief = self._heard("Belief")[-1]
+        return belief["run"], belief["seq"]
+
+    def _heard(self, type_):
         heard = [json.loads(line) for line in self._watched.read_text().splitlines(keepends=True) if line.endswith("\n")]
-        return [line["message"] for line in heard if line["type"] == "Target" and line["message"]["final"]]
+        return [line["message"] for line in heard if line["type"] == type_]
 
     def wait_for_right_answer(self, after=0):
         """Wait for an answer beyond the first `after` that names the POI."""
@@ -84,21 +93,24 @@ def pair(hosts, tmp_path, robot):
     assert two.stop() == [0, 0, 0], "robot, edge and watch stop in good order"
 
 
-def test_the_poi_is_named_across_the_link(hosts, pair):
+def test_the_poi_is_named_across_the_link_and_each_frame_crosses_it_once(hosts, pair):
     hosts.link(delay_ms=5, jitter_ms=2)
-    pair.start("bgr8", ("--connect", EDGE))
+    pair.start("bgr8", ("--connect", EDGE), ("--listen", "tcp/0.0.0.0:7447", "--insecure"))
     pair.wait_for_right_answer()
-    assert hosts.statistics.bytes > 50_000_000, "raw frames went over the link and not around it"
+    assert_each_frame_crosses_once(hosts, pair.newest_frame)
 
 
-def test_the_poi_is_named_again_after_the_link_was_cut(hosts, pair):
+def test_the_poi_is_named_by_mutual_tls_and_again_after_the_link_was_cut(hosts, pair, robot, tmp_path):
     hosts.link(delay_ms=5, jitter_ms=2)
-    pair.start("jpeg", TWO_LINKS)
+    site = make_site(tmp_path / "site")
+    robots, edges = add(site, f"robot:{robot}"), add(site, "edge:e1", ADDRESS)
+    listen = ("--listen", "tcp/127.0.0.1:7447", "--listen", "tls/0.0.0.0:7448", "--certs", edges.folder)
+    pair.start("jpeg", (*TWO_LINKS, "--certs", robots.folder), listen)
     pair.wait_for_right_answer()
 
     hosts.cut()
-    robot = pair.folder / "robot"
-    wait_until(lambda: "no link yet" in robot.read_text(), "the robot's router notices the cut", 20, robot)
+    log = pair.folder / "robot"
+    wait_until(lambda: "no link yet" in log.read_text(), "the robot's router notices the cut", 20, log)
     before = len(pair.answers())
     hosts.restore()
 

@@ -129,6 +129,22 @@ def test_a_slow_stage_is_blamed_and_not_those_behind_it():
     assert wrong(system(processes=slow)) == ["tracker/tracks: 9.0/s, expected 30/s"]
 
 
+def test_an_edit_that_is_denied_is_as_meant_for_who_may_not_edit():
+    listening = Listening(CLEAN.healths, edits_reach_fusion=False, may_edit=False)
+    assert wrong(system(), listening) == []
+    assert [f.advice for f in findings(system(), listening) if "do not reach fusion" in f.what] == [
+        "as meant: our certificate is not an editor's"
+    ]
+
+
+def test_what_all_stages_of_a_host_show_is_said_once():
+    note = "the certificate edge:e1 in /c/cert.pem expires in 3 days"
+    shown = system(processes={stage: [process(stage, notes=[note])] for stage in ("fusion", "gesture")})
+    assert [f.what for f in findings(shown, CLEAN) if note in f.what] == [f"fusion, gesture: {note}"] or [
+        f.what for f in findings(shown, CLEAN) if note in f.what
+    ] == [f"gesture, fusion: {note}"]
+
+
 def found(system, start, listening=CLEAN):
     """The findings that begin so."""
     return [finding for finding in findings(system, listening) if finding.what.startswith(start)]
@@ -150,7 +166,7 @@ def test_frames_that_all_come_too_late_are_not_called_denied():
 
 
 def test_topics_that_are_kept_from_us_are_named_and_only_what_tools_need_is_wrong():
-    listening = Listening(CLEAN.healths, True, {"tracker/tracks": False, "headpose/poses": True, "fusion/belief": False})
+    listening = Listening(CLEAN.healths, True, paths={"tracker/tracks": False, "headpose/poses": True, "fusion/belief": False})
     said = {finding.what: finding.level for finding in findings(system(), listening) if "we hear none" in finding.what}
     assert said == {
         "tracker/tracks: tracker publishes 30/s of it, and we hear none": "note",
@@ -159,7 +175,7 @@ def test_topics_that_are_kept_from_us_are_named_and_only_what_tools_need_is_wron
 
 
 def test_what_nobody_publishes_is_not_called_kept_from_us():
-    listening = Listening(CLEAN.healths, True, {"fusion/belief": False})
+    listening = Listening(CLEAN.healths, True, paths={"fusion/belief": False})
     assert wrong(system(processes={"fusion": [process("fusion", outputs=[], uptime_s=1)]}), listening) == []
 
 

@@ -53,9 +53,16 @@ def test_one_poi_is_asked_for_by_its_key():
 
 
 def test_an_empty_registry_is_told_from_an_absent_fusion():
-    assert get_pois(Session({"fusion/state": [("fusion/state", state())]}), "r1") == []
+    assert get_pois(Session({"fusion/state?top=1024": [("fusion/state", state())]}), "r1") == []
     assert get_pois(Session({}), "r1") is None
     assert get_names(Session({}), "r1") == {}
+
+
+def test_a_viewer_whose_gets_on_pois_are_denied_is_told_of_them_by_the_state():
+    denied = Session({"fusion/state?top=1024": [("fusion/state", state(POIS))]})
+    assert get_pois(denied, "r1") == POIS
+    assert get_pois(denied, "r1", "P007") == [POIS[7]]
+    assert get_names(denied, "r1")["P099"] == "thing 99"
 
 
 def test_a_state_of_more_than_a_mebibyte_is_read():

@@ -9,6 +9,7 @@ import pytest
 from deixis_runtime.environment import ENVIRONMENT
 from deixis_runtime.router import router_config
 from deixis_runtime.site import load_site
+from deixis_runtime.two_links import two_links
 from running import ROOT
 
 SETTINGS = sorted((ROOT / "config").glob("*.json5"))
@@ -23,7 +24,9 @@ def test_our_router_takes_the_settings_and_the_endpoints_of_the_command_line(pat
     assert json.loads(config.get_json("scouting/multicast/enabled")) is False
     assert json.loads(config.get_json("transport/shared_memory/transport_optimization/enabled")) is False
     assert json.loads(config.get_json("listen/endpoints")) == ["tcp/127.0.0.1:1"]
-    assert json.loads(config.get_json("connect/endpoints")) == ["tcp/127.0.0.1:2"]
+    links = json.loads(config.get_json("transport/unicast/max_links"))
+    endpoints = ["tcp/127.0.0.1:2"] if links == 1 else two_links("tcp/127.0.0.1:2")
+    assert json.loads(config.get_json("connect/endpoints")) == endpoints
 
 
 @pytest.mark.skipif(shutil.which("zenohd") is None, reason="there is no zenohd here")

@@ -198,8 +198,8 @@ def test_of_many_edits_so_many_are_taken_at_once_in_their_order_and_the_loop_is_
     assert len(woken) == 1
 
 
-def frame_sample(seq, stamp_ns):
-    payload = codec.encode(FRAME.model_copy(update={"seq": seq, "stamp_ns": stamp_ns}))
+def frame_sample(seq, stamp_ns, run=FRAME.run):
+    payload = codec.encode(FRAME.model_copy(update={"run": run, "seq": seq, "stamp_ns": stamp_ns}))
     key = topics.FRAME.key("r1")
     return SimpleNamespace(
         key_expr=key, kind=SampleKind.PUT, payload=ZBytes(payload), encoding=codec.encoding_of(topics.FRAME.type)
@@ -285,6 +285,46 @@ def test_what_is_larger_than_its_topic_allows_is_refused_and_not_kept(log):
     assert (tracks.received, tracks.rejected) == (1, 1)
     assert tracks.health().last_error == "1048577 bytes, more than the 1048576 allowed"
     assert log.said == ["deixis/r1/tracker/tracks: rejected: 1048577 bytes, more than the 1048576 allowed"]
+
+
+class ClockOfTheCamera:
+    """What ClockWatch tells once it has compared: the camera's clock is an hour ahead, give or take 0.1 s."""
+
+    AHEAD_NS = 3600 * 10**9
+
+    def __init__(self):
+        self.known = True
+
+    def age_ns(self, stamp_ns, now_ns):
+        return now_ns + self.AHEAD_NS - 10**8 - stamp_ns if self.known else None
+
+    def forget(self):
+        self.known = False
+
+
+def hear_frame(frames, clock, seq, age_s, run=1, set_by_s=0.0):
+    """A second later a frame comes that was captured `age_s` ago by the camera's clock, which was set by so much."""
+    clock.now_s += 1.0
+    stamp_ns = round((clock.now_s - age_s + set_by_s) * 1e9) + ClockOfTheCamera.AHEAD_NS
+    frames.store(frame_sample(seq, stamp_ns, run))
+    return [frame.seq for frame in frames.take_all()]
+
+
+def test_a_backlog_that_always_was_is_seen_by_the_cameras_clock(log, clock):
+    frames = Subscription(topics.FRAME, "deixis/r1/camera/frame", 8, no_wake, log, clock=ClockOfTheCamera())
+    assert hear_frame(frames, clock, 0, 0.9) == [0]
+    assert hear_frame(frames, clock, 1, 1.05) == [1], "it may be younger than 1 s: the clocks are not known better"
+    assert hear_frame(frames, clock, 2, 1.2) == []
+    assert hear_frame(frames, clock, 0, 4.0, run=2) == [], "a new run, as of a looped recording, changes no clock"
+    assert frames.too_old == 2
+
+
+def test_a_cameras_clock_that_is_set_back_makes_no_frame_old(log, clock):
+    frames = Subscription(topics.FRAME, "deixis/r1/camera/frame", 8, no_wake, log, clock=ClockOfTheCamera())
+    assert hear_frame(frames, clock, 0, 0.1) == [0]
+    assert hear_frame(frames, clock, 1, 0.1, set_by_s=-300.0) == [1]
+    assert hear_frame(frames, clock, 2, 0.1, set_by_s=-300.0) == [2]
+    assert frames.too_old == 0
 
 
 def test_step_times_are_those_of_the_last_second():

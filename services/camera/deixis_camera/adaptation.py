@@ -1,8 +1,9 @@
 """How much the camera sends, by how its frames arrive: when a picture is held back, and when to take another rung. Pure.
 
 Two parts, one quick and one slow. `InFlight` holds a picture back while those before it are late, so no queue on the way grows,
-whatever the link does. The ladder follows within half a second: where many pictures are held back, frames are too large or too
-many, and it goes down to what came through; where all goes well for a while it goes up one rung, to try. A rung that was tried
+whatever the link does. The ladder follows within seconds: where many pictures are held back, or half of the answers stay late,
+frames are too large or too many, and it goes down to what came through; where all goes well for a while it goes up one rung,
+to try. A rung that was tried
 in vain is tried again after twice as long each time, so nothing swings to and fro.
 
 Silence, as of a cut link, is something else: nobody knows what the link will carry when it is back. Then few and small frames
@@ -19,22 +20,27 @@ from deixis_schemas.messages import FrameId
 from .in_flight import InFlight
 from .ladder import Rung
 
-PERIOD_S = 0.5
+PERIOD_S = 1.0
+CLIMBING_PERIOD_S = 0.5
 LONGEST_PERIOD_S = 2.0
 LEAST_PICTURES = 3
 """Periods with fewer pictures due say nothing yet."""
 MANY_HELD = 0.25
 FEW_HELD = 0.05
+LATE = 2 / 3
+"""Of the slack: answers that are so much later than the quickest, half of them, wait behind others."""
+LATE_S = 2.0
+"""Lateness that stands so long is a queue; a shorter one may be chance."""
 MOST_DOWN = 3
-"""Rungs down at once, at most: what half a second showed may be a passing trouble."""
+"""Rungs down at once, at most: what a second showed may be a passing trouble."""
 USABLE = 0.85
 """Of the bytes a second that came through, to leave room for those that vary."""
 MOST_UP = 2
 """Rungs up at once on the way back, which is less than twice the bytes; else one."""
 FIRST_HOLD_S = 2.0
 LONGEST_HOLD_S = 30.0
-TRIED_S = 4.0
-"""Trouble so soon after a step up means that the step was too much."""
+TRIED_S = 10.0
+"""Trouble so soon after a step up means that the step was too much: a queue may grow slowly."""
 SILENT_S = 1.0
 
 
@@ -60,9 +66,10 @@ class _Period:
         self.arrived_bytes = 0
         self.took_s: list[float] = []
 
-    def is_over(self, now_s: float) -> bool:
+    def is_over(self, now_s: float, usual_s: float) -> bool:
+        """Whether it is long enough to judge by, as a rule `usual_s`."""
         long = now_s - self.began_s
-        return (long >= PERIOD_S and self.due >= LEAST_PICTURES) or long >= LONGEST_PERIOD_S
+        return (long >= usual_s and self.due >= LEAST_PICTURES) or long >= LONGEST_PERIOD_S
 
     def share_held(self) -> float:
         return self.held / self.due if self.due else 0.0
@@ -81,6 +88,7 @@ class Adaptation:
         self._silent = False
         self._hold_s = [FIRST_HOLD_S] * len(rungs)
         self._good_s = 0.0
+        self._late_s = 0.0
         self._climbed_s = now_s - TRIED_S
         self._down_s = now_s - LONGEST_HOLD_S
         self._down_from = 0
@@ -127,7 +135,7 @@ class Adaptation:
         """Take another rung where it is time to."""
         if self._in_flight.waited_s(now_s) and now_s - self._heard_s >= SILENT_S:
             self._fall_silent(now_s)
-        elif not self._silent and self._period.is_over(now_s):
+        elif not self._silent and self._period.is_over(now_s, CLIMBING_PERIOD_S if self._climbing() else PERIOD_S):
             self._judge(now_s)
             self._begin_period(now_s)
 
@@ -156,7 +164,12 @@ class Adaptation:
         self._took_s = median(period.took_s) if period.took_s else None
         if period.share_held() > MANY_HELD:
             self._go_down(now_s)
-        elif period.share_held() <= FEW_HELD and self._is_quick():
+            return
+        late = self._took_s is not None and self._took_s > self._in_flight.quickest_s() + LATE * self._slack_s
+        self._late_s = self._late_s + long_s if late else 0.0
+        if self._late_s >= LATE_S:
+            self._go_down(now_s)
+        elif period.share_held() <= FEW_HELD and period.took_s and not late:
             self._good_s += long_s
             if self._at > 0 and self._good_s >= self._needed_s():
                 self._go_up(now_s)
@@ -165,14 +178,11 @@ class Adaptation:
         if self._good_s > LONGEST_HOLD_S:
             self._hold_s[self._at] = FIRST_HOLD_S  # what carried for so long is no rung to be wary of
 
-    def _is_quick(self) -> bool:
-        return self._took_s is not None and self._took_s <= self._in_flight.quickest_s() + self._slack_s / 2
-
     def _go_down(self, now_s: float) -> None:
         if now_s - self._climbed_s <= TRIED_S:
             self._hold_s[self._at] = min(LONGEST_HOLD_S, 2 * self._hold_s[self._at])
         self._back_to = len(self._rungs)  # this is what the link carries: from here on up with care
-        self._good_s = 0.0
+        self._good_s = self._late_s = 0.0
         if now_s - self._down_s > PERIOD_S + LONGEST_PERIOD_S:
             self._down_from = self._at
         self._down_s = now_s
@@ -194,7 +204,7 @@ class Adaptation:
         return self._at > self._back_to
 
     def _needed_s(self) -> float:
-        return PERIOD_S if self._climbing() else self._hold_s[self._at - 1]
+        return CLIMBING_PERIOD_S if self._climbing() else self._hold_s[self._at - 1]
 
     def _begin_period(self, now_s: float) -> None:
         self._period = _Period(now_s)

@@ -40,7 +40,7 @@ class CameraConfig(StageConfig):
     )
     adapt_least_rate_hz: float = Field(default=5.0, ge=0.2, le=60, description="Adapting: fewest frames per second.")
     adapt_slack_ms: float = Field(
-        default=100.0,
+        default=150.0,
         ge=10,
         le=1000,
         description="Adapting: how much longer than the quickest answer of late a frame may be without one, before the next is "

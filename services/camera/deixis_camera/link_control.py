@@ -125,5 +125,5 @@ def say(rung: Rung, elsewhere: set[str], report: LinkReport | None) -> str:
         return f"{sent}: no answer yet"
     measured = f"{report.bytes_s / 1e3:.0f} kB/s arrive, answered after {report.took_s * 1e3:.0f} ms"
     return f"{sent}: {measured} (at the quickest {report.quickest_s * 1e3:.0f} ms)" + (
-        "" if report.is_best else "; the link takes no more"
+        "" if report.is_best else "; no more comes in time"
     )

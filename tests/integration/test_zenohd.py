@@ -1,0 +1,100 @@
+"""The whole chain through a stock zenohd on each of two hosts, in place of our router, with the settings that we ship.
+
+There is none among the project's packages. It is built once from its crate (docs/deployment.md) and found on the PATH, or where
+DEIXIS_ZENOHD says.
+"""
+
+import json
+import os
+import shutil
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from running import BIN, CLIP, POINTED_AT, ROOT, SITE, process, tail, wait_until
+from two_hosts import TwoHosts, assert_each_frame_crosses_once, missing_for_two_hosts
+
+ZENOHD = os.environ.get("DEIXIS_ZENOHD") or shutil.which("zenohd")
+WHY_NOT = missing_for_two_hosts() or (
+    "" if ZENOHD else "there is no zenohd: build it (docs/deployment.md) or name it in DEIXIS_ZENOHD"
+)
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
+
+PATIENCE_S = 90.0
+ROBOT = "zenohd-test"
+ON = {"camera": "robot", "tracker": "edge", "headpose": "edge", "gesture": "edge", "fusion": "edge"}
+OF_CAMERA = ("--set", f"source={CLIP}", "--set", "loop=true", "--set", "encoding=bgr8")
+
+
+class Chain:
+    """A zenohd on each host, the stages as clients of theirs, and `deixis watch` on the edge."""
+
+    def __init__(self, hosts, folder):
+        self.hosts, self.folder = hosts, folder
+        self._stack = ExitStack()
+
+    def __enter__(self):
+        # A socket's path is limited to about 100 bytes.
+        self._sockets = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="zenohd-")))
+        self._run("robot", "zenohd-robot", self._zenohd("robot", "-e", "tcp/10.77.0.2:7447"))
+        self._run("edge", "zenohd-edge", self._zenohd("edge", "-l", "tcp/0.0.0.0:7447"))
+        for host in ("robot", "edge"):
+            wait_until(self._socket(host).exists, f"a zenohd on {host}", PATIENCE_S, self.folder / f"zenohd-{host}")
+        self._run("edge", "watch", self._client("edge", "deixis", "watch", "--json"))
+        for stage, host in ON.items():
+            more = {"camera": OF_CAMERA, "fusion": ("--set", f"registry={self.folder / 'pois.sqlite'}")}.get(stage, ())
+            argv = self._client(host, f"deixis-{stage}", "--site", SITE, "--lockstep", *more)
+            self._run(host, stage, argv)
+        return self
+
+    def __exit__(self, *_):
+        self._stack.close()
+
+    def said(self):
+        """What every process has said."""
+        return "\n".join(f"{file.name}:\n{tail(file)}" for file in sorted(self.folder.iterdir()))
+
+    def heard(self, type_):
+        """The messages of a type that came to `deixis watch`."""
+        lines = (self.folder / "watch").read_text().splitlines(keepends=True)
+        documents = [json.loads(line) for line in lines if line.startswith("{") and line.endswith("\n")]
+        return [document["message"] for document in documents if document["type"] == type_]
+
+    def _zenohd(self, host, *endpoints):
+        return [ZENOHD, "-c", ROOT / "config" / f"{host}.json5", "-l", self._endpoint(host), *endpoints]
+
+    def _client(self, host, name, *arguments):
+        return [BIN / name, *arguments, "--robot", ROBOT, "--connect", self._endpoint(host)]
+
+    def _socket(self, host):
+        return self._sockets / f"{host}.sock"
+
+    def _endpoint(self, host):
+        return f"unixsock-stream/{self._socket(host)}"
+
+    def _run(self, host, name, argv):
+        self._stack.enter_context(process(self.hosts.command(host, argv), self.folder / name))
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory):
+    with TwoHosts("robot", "edge") as hosts:
+        hosts.link(delay_ms=2)
+        with Chain(hosts, tmp_path_factory.mktemp("chain")) as it:
+            yield it
+
+
+def test_the_poi_is_named_across_two_hosts_with_a_stock_zenohd_on_each(chain):
+    def named():
+        return any(answer["final"] and answer["poi_ids"] == [POINTED_AT] for answer in chain.heard("Target"))
+
+    wait_until(named, f"{POINTED_AT} named on the edge; so far:\n{chain.said()}", PATIENCE_S)
+
+
+def test_each_frame_crosses_the_link_once_though_two_stages_read_it(chain):
+    def newest():
+        belief = chain.heard("Belief")[-1]
+        return belief["run"], belief["seq"]
+
+    assert_each_frame_crosses_once(chain.hosts, newest)
