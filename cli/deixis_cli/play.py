@@ -17,7 +17,7 @@ from deixis_runtime.session import Unreachable, first_line
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
-from .gets import get_healths, get_names, get_raw, get_state
+from .gets import TIMEOUT_S, get_healths, get_names, get_raw, get_state
 from .inbox import Inbox, Received
 from .mcap_file import McapFileError, McapRecorder
 from .play_end import PlayEnd
@@ -28,6 +28,7 @@ log = logging.getLogger("deixis-play")
 
 TURN_S = 0.05
 SETTLE_S = 4.0
+STOPPED_ANSWER_S = 0.2
 MAX_TARGETS = 1000
 
 OnMessage = Callable[[str, Message], None]
@@ -198,14 +199,16 @@ class Playback:
             self._counts["unanswered"] += 1
             log.warning("%s: the last frame was not answered", path)
         deadline_s = time.monotonic() + SETTLE_S
+        # Who told us to stop does not wait for a stage that hangs.
+        answer_s = STOPPED_ANSWER_S if self.interrupts.requested() else TIMEOUT_S
         while topics.STATE.stage in self._options.stages:
-            self.result.state = state = get_state(host.session, self._options.robot) or self.result.state
+            self.result.state = state = get_state(host.session, self._options.robot, answer_s) or self.result.state
             self._turn(host)
             if not self._ended() or self._has_all(state) or time.monotonic() > deadline_s:
                 break
         if topics.POI.stage in self._options.stages:
-            self.result.names = get_names(host.session, self._options.robot)
-        for health in get_healths(host.session, self._options.robot):
+            self.result.names = get_names(host.session, self._options.robot, answer_s)
+        for health in get_healths(host.session, self._options.robot, answer_s):
             if health.stage != topics.SUPERVISOR:  # it is we, and say in `failure` what is worth saying
                 self.result.health[health.stage] = health
 

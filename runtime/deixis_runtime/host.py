@@ -208,7 +208,7 @@ class Host:
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), alone=False)
+        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
