@@ -183,6 +183,9 @@ INPUTS: dict[str, tuple[Topic, ...]] = {
 }
 """What each stage works on; those about frames in the order in which they come."""
 
+SUPERVISOR = "supervisor"
+"""The name, in place of a stage's, of the process that starts a host's stages: its health says how they fare."""
+
 
 def alive_key(robot: str, stage: str, instance: str) -> str:
     """Liveliness token of one process of a stage."""
