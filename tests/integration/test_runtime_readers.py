@@ -19,9 +19,11 @@ def router(wait_for, *arguments):
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     process = subprocess.Popen([sys.executable, "-m", "deixis_runtime.router", "--listen", endpoint, *arguments])
     wait_for(lambda: answers(endpoint), "the router listens")
-    yield endpoint
-    process.terminate()
-    assert process.wait(10) == 0
+    try:
+        yield endpoint
+    finally:
+        process.terminate()
+        process.wait(10)
 
 
 @contextmanager
@@ -33,9 +35,11 @@ def stage(name, robot, endpoint, topic=None):
             node.subscribe(topic)
         thread = threading.Thread(target=lambda: [None for _ in iter(node.wait, False)])
         thread.start()
-        yield node
-        node.stop()
-        thread.join(5)
+        try:
+            yield node
+        finally:
+            node.stop()
+            thread.join(5)
 
 
 @pytest.fixture(scope="module")
