@@ -5,7 +5,7 @@ SITE ?=
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
@@ -43,9 +43,9 @@ check: setup
 bench: setup
 	@$(BIN)/python bench/pipeline.py
 
-# After a change of messages or topics: JSON Schema, golden bytes and the topic table
+# After a change of messages or topics: JSON Schema, golden bytes, the topic table and the page for people
 contract: setup
-	@$(BIN)/python -m deixis_schemas.export schemas/contract
+	@$(BIN)/python -m deixis_schemas.export schemas/contract docs/contract.md
 
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup

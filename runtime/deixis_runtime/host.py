@@ -29,7 +29,7 @@ from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
 from .stage import Node
 from .supervisor import Supervisor
-from .supervisor_health import STAGE, account_of
+from .supervisor_health import account_of
 from .watchdog import Patience
 
 log = logging.getLogger("deixis-supervisor")
@@ -208,7 +208,7 @@ class Host:
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._node = Node(self.session, STAGE, self._node_options(), alone=False)
+        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
