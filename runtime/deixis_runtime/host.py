@@ -35,6 +35,7 @@ from .watchdog import Patience
 log = logging.getLogger("deixis-supervisor")
 
 POLL_S = 0.02
+START_S = 30.0
 HELD_PERIOD_S = 0.5
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
@@ -245,8 +246,7 @@ class Host:
         return command
 
     def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], set[str]]) -> None:
-        ready_s = self.options.patience.ready_s
-        deadline = time.monotonic() + ready_s
+        deadline = time.monotonic() + START_S
         while not ready():
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
@@ -254,7 +254,7 @@ class Host:
             if self._stopped():
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
-                raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
+                raise HostFailed(f"not ready within {START_S:g} s: {', '.join(sorted(missing()))}")
             self._tell(time.monotonic())
             time.sleep(POLL_S)
 
