@@ -23,7 +23,6 @@ from deixis_schemas import topics
 from deixis_schemas.topics import Topic
 
 from .access import AccessList, Member, Role
-from .supervisor_health import STAGE as SUPERVISOR
 
 ANY = "*"
 CAMERA = topics.FRAME.stage
@@ -144,12 +143,12 @@ def _edits() -> list[Grant]:
     return [Grant("ingress", (*DATA, "query"), _keys(ANY, [topics.POI]))]
 
 
-def _sends(robot: str, stages: tuple[str, ...], published: list[Topic]) -> list[Grant]:
-    """What is allowed to a host that these stages of the robot run on."""
+def _sends(robot: str, stages: Iterable[str], published: list[Topic]) -> list[Grant]:
+    """What is allowed to a host that these stages of the robot run on, under a supervisor."""
+    processes = (*stages, topics.SUPERVISOR)
     answered = [topic for topic in published if topic.queryable]
-    processes = (*stages, SUPERVISOR)
-    health = tuple(topics.HEALTH.key(robot, stage=stage) for stage in processes)
-    alive = tuple(topics.alive_key(robot, stage, ANY) for stage in processes)
+    health = tuple(topics.HEALTH.key(robot, stage=name) for name in processes)
+    alive = tuple(topics.alive_key(robot, name, ANY) for name in processes)
     return [
         Grant("ingress", DATA, (*_keys(robot, published), *health)),
         Grant("ingress", ("declare_queryable", "reply"), (*_keys(robot, answered), *health)),

@@ -29,12 +29,13 @@ from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
 from .stage import Node
 from .supervisor import Supervisor
-from .supervisor_health import STAGE, account_of
+from .supervisor_health import account_of
 from .watchdog import Patience
 
 log = logging.getLogger("deixis-supervisor")
 
 POLL_S = 0.02
+START_S = 30.0
 HELD_PERIOD_S = 0.5
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
@@ -136,7 +137,8 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
-        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
+        forks = ForkServer(self.forkables() if self.options.fork else [], stopped)
+        self.supervisor.launch = self._stack.enter_context(forks).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:
@@ -208,7 +210,7 @@ class Host:
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._node = Node(self.session, STAGE, self._node_options(), alone=False)
+        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
@@ -245,8 +247,7 @@ class Host:
         return command
 
     def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], set[str]]) -> None:
-        ready_s = self.options.patience.ready_s
-        deadline = time.monotonic() + ready_s
+        deadline = time.monotonic() + START_S
         while not ready():
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
@@ -254,7 +255,7 @@ class Host:
             if self._stopped():
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
-                raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
+                raise HostFailed(f"not ready within {START_S:g} s: {', '.join(sorted(missing()))}")
             self._tell(time.monotonic())
             time.sleep(POLL_S)
 
