@@ -138,7 +138,8 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
-        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
+        forks = ForkServer(self.forkables() if self.options.fork else [], stopped)
+        self.supervisor.launch = self._stack.enter_context(forks).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:

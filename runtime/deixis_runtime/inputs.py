@@ -198,8 +198,7 @@ class Subscription(Generic[T]):
             self._heard[who] = (self._heard[who][0], now)
         elif len(self._heard) < MAX_PRODUCERS:
             self._heard[who] = (now, now)
-        producers = self.producers()
-        if len(producers) > 1:
+        if len(self._heard) > 1 and len(producers := self.producers()) > 1:
             self._report(f"producers {key}", f"{key}: more than one producer: {', '.join(producers)}")
 
 

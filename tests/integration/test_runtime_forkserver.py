@@ -109,6 +109,15 @@ def test_what_cannot_be_imported_or_starts_a_thread_is_not_forked(tmp_path, monk
         assert server.targets == frozenset()
 
 
+def test_who_is_told_to_stop_does_not_wait_for_imports(tmp_path, monkeypatch):
+    (tmp_path / "endless.py").write_text("import time\ntime.sleep(60)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    began_s = time.monotonic()
+    with ForkServer([Forkable(("endless",), "endless:main")], stopped=lambda: True) as server:
+        assert server.targets == frozenset()
+    assert time.monotonic() - began_s < 10
+
+
 def test_the_router_and_all_stages_of_ours_are_forked():
     """None of their imports starts a thread: a process with threads must not be forked."""
     with ForkServer(Host(HostOptions(robot="r", stages=topics.STAGES)).forkables()) as server:
