@@ -5,7 +5,7 @@ SITE ?=
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
@@ -33,8 +33,8 @@ else
 endif
 
 test: setup check
-	@# Two at a time; a file's tests stay together, for they share the system that they run.
-	@$(BIN)/pytest -n 2 --dist loadfile
+	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
+	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
@@ -43,9 +43,9 @@ check: setup
 bench: setup
 	@$(BIN)/python bench/pipeline.py
 
-# After a change of messages or topics: JSON Schema, golden bytes and the topic table
+# After a change of messages or topics: JSON Schema, golden bytes, the topic table and the page for people
 contract: setup
-	@$(BIN)/python -m deixis_schemas.export schemas/contract
+	@$(BIN)/python -m deixis_schemas.export schemas/contract docs/contract.md
 
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup

@@ -12,7 +12,8 @@ with _N for N robots, over the measured seconds:
 * latency_ms_p50, _p95: from the stamp of a frame, as its tracks go out, to the receipt of fusion's belief;
 * answered: beliefs by frames played, complete: beliefs that had to do without no stage, by beliefs; late_ms: the latest that a
   robot was to play a frame: where it is large, this machine was full;
-* targets: answers to pointings, right: those that name what that robot's recording points at, under the robot's own name of it;
+* targets: answers to pointings, right: those that name what that robot's recording points at, under the robot's own name of it,
+  unsure: those that name nothing, or that one with others, as is due where too few frames come through; wrong: all others;
 * foreign: beliefs and targets on a robot's keys that are not its own: of another's run, or with a POI of another. After each
   measurement each robot's registry is edited, and then all have to hold their own POIs and that one.
 The exit is 1 where any robot heard another, was not answered at all, or was answered wrongly more than once in ten.
@@ -59,7 +60,7 @@ WARM_UP_S = 3.0
 START_S = 120.0
 ANSWER_S = 10.0
 POLL_S = 0.1
-RIGHT_AT_LEAST = 0.9
+WRONG_AT_MOST = 0.1
 EDITED = "edited"
 WIDTH = 100
 
@@ -185,7 +186,7 @@ def measure(count: int, seconds: float, interrupts: Interrupts) -> dict[str, flo
     failures = [player.failure for player in players if player.failure]
     if failures:
         raise FleetFailed("; ".join(failures))
-    for what in said.foreign[:5]:
+    for what in [*said.foreign[:5], *wrong_answers(said, robots)[:5]]:
         print(f"bench/fleet: {what}", file=sys.stderr)
     late_ms = 1000 * max(player.late_s for player in players)
     return {
@@ -273,20 +274,37 @@ def of_answers(said: Said, robots: Sequence[Robot], frames: int) -> dict[str, fl
         "robots_unanswered": sum(not answered[robot.name] for robot in robots),
         "targets": len(said.finals),
         "right": sum(target.poi_ids == answers[name] for name, target in said.finals),
+        "unsure": sum(target.poi_ids != answers[name] and not is_wrong(target, answers[name]) for name, target in said.finals),
+        "wrong": sum(is_wrong(target, answers[name]) for name, target in said.finals),
         "foreign": len(said.foreign),
     }
 
 
+def wrong_answers(said: Said, robots: Sequence[Robot]) -> list[str]:
+    """The answers that name something else than the recording points at, in words."""
+    answers = {robot.name: robot.answer for robot in robots}
+    return [
+        f"{name}: {', '.join(target.poi_ids)} for {', '.join(answers[name])}: {target.reason}"
+        for name, target in said.finals
+        if is_wrong(target, answers[name])
+    ]
+
+
+def is_wrong(target: Target, answer: list[str]) -> bool:
+    """Whether it names something without what was pointed at; nothing, or that among others, is unsure and not wrong."""
+    return bool(target.poi_ids) and not set(answer) <= set(target.poi_ids)
+
+
 def faults_of(count: int, figures: dict[str, float]) -> list[str]:
     """What must not be, in words."""
-    targets, right = figures["targets"], figures["right"]
+    targets, right, wrong = figures["targets"], figures["right"], figures["wrong"]
     found = {
         f"{figures['robots_unanswered']:.0f} of {count} robots were not answered": figures["robots_unanswered"] > 0,
         f"{figures['foreign']:.0f} answers or registries with another robot's": figures["foreign"] > 0,
-        f"{right:.0f} of {targets:.0f} pointings of {count} robots answered rightly": right < RIGHT_AT_LEAST * targets
-        or not targets,
+        f"{wrong:.0f} of {targets:.0f} pointings of {count} robots answered wrongly": wrong > WRONG_AT_MOST * targets,
+        f"none of {targets:.0f} pointings of {count} robots answered rightly": not right,
     }
-    return [text for text, wrong in found.items() if wrong]
+    return [text for text, so in found.items() if so]
 
 
 def figure_table(measured: dict[int, dict[str, float]]) -> Table:
@@ -302,6 +320,7 @@ def figure_table(measured: dict[int, dict[str, float]]) -> Table:
         "p95 ms": lambda f: f"{f['latency_ms_p95']:.1f}",
         "answered": lambda f: f"{100 * f['answered']:.1f} %",
         "right": lambda f: f"{f['right']:.0f}/{f['targets']:.0f}",
+        "wrong": lambda f: f"{f['wrong']:.0f}",
         "foreign": lambda f: f"{f['foreign']:.0f}",
     }
     for title in columns:

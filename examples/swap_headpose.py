@@ -8,12 +8,15 @@ import argparse
 import json
 import math
 import os
+import signal
 import sys
 import time
 from collections import defaultdict
 
 import numpy as np
 import zenoh
+from deixis_runtime.age import RelativeAge
+from deixis_runtime.images import decode_image
 from deixis_schemas import Producer, codec, topics
 from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_schemas.messages import HeadPoses
@@ -85,29 +88,40 @@ def main():
     parser.add_argument("--wait", type=float, default=20.0, metavar="S", help="for the router to come (default: %(default)s)")
     given = parser.parse_args()
     producer = Producer("headpose", f"swap-{os.getpid()}")
+    stopping = []
+    signal.signal(signal.SIGTERM, lambda *_: stopping.append(True))
     with open_session(given.connect, given.wait) as session:
         # Rings keep the newest: whoever is slow works on what is new and never on a backlog.
         frames = session.declare_subscriber(topics.FRAME.key(given.robot), zenoh.handlers.RingChannel(8))
         tracks = session.declare_subscriber(topics.TRACKS.key(given.robot), zenoh.handlers.RingChannel(1))
+        infos = session.declare_subscriber(topics.CAMERA_INFO.key(given.robot), zenoh.handlers.RingChannel(1))
         poses = session.declare_publisher(topics.HEAD_POSES.key(given.robot), encoding=codec.encoding_of(HeadPoses))
         alive = session.liveliness().declare_token(topics.alive_key(given.robot, *producer))
         print(f"swap_headpose: alive as {producer.instance}", flush=True)
-        held, first, run = {}, defaultdict(list), None
-        while alive:
-            seen = read(topics.TRACKS, tracks.recv())
+        held, first, run, age, lockstep = {}, defaultdict(list), None, RelativeAge(), False
+        while alive and not stopping:
+            sample = tracks.try_recv()
+            if sample is None:
+                time.sleep(0.002)  # and not `recv`: while that waits, no signal is heard
+                continue
+            seen = read(topics.TRACKS, sample)
+            if (sample := infos.try_recv()) is not None and (info := read(topics.CAMERA_INFO, sample)) is not None:
+                lockstep = info.lockstep
             while (sample := frames.try_recv()) is not None:
                 frame = read(topics.FRAME, sample)
-                if frame is not None and frame.encoding != "bgr8":
-                    sys.exit(f"swap_headpose: frames are {frame.encoding}; start the camera with --set camera.encoding=bgr8")
                 if frame is not None:
                     held[frame.frame_id] = frame
             held = dict(list(held.items())[-8:])
             if seen is None or seen.frame_id not in held:
                 continue
+            received_ns = time.monotonic_ns()
+            age.note(*seen.frame_id, seen.stamp_ns, received_ns)
+            if age.age_s(seen.stamp_ns, received_ns) > topics.TRACKS.max_age_s and not lockstep:
+                continue  # what a link that was cut gives out when it is mended; in lockstep the frames wait for us
             if seen.run != run:  # the camera began anew, or the recording plays again: other people, or the same elsewhere
                 run, first = seen.run, defaultdict(list)
             frame = held[seen.frame_id]
-            picture = np.frombuffer(frame.data, np.uint8).reshape(frame.height, frame.width, 3)
+            picture = decode_image(frame)  # bgr8, mono8, or over a link jpeg
             faces = {track.person_id: track for track in seen.tracks if track.kind == "face" and track.person_id is not None}
             found = [head_pose(who, dark_offset(picture, face.bbox_px), first[who]) for who, face in faces.items()]
             poses.put(codec.encode(HeadPoses.derive(seen, producer, poses=found)))

@@ -16,6 +16,30 @@ ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"
 
 
+# Two workers take file by file: one that takes minutes must not be the last. These begin, by how long they took.
+LONGEST_FIRST = (
+    "test_compose.py",
+    "test_rehearsal.py",
+    "test_two_hosts.py",
+    "test_link.py",
+    "test_systemd.py",
+    "test_garbage.py",
+    "test_zenoh_cli.py",
+    "test_skewed_clock.py",
+    "test_supervision_stages.py",
+    "test_zenohd.py",
+    "test_camera_process.py",
+    "test_cli_system.py",
+    "test_registry_service.py",
+)
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take longest."""
+    rank = {name: place for place, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
 @pytest.fixture(scope="session")
 def clips():
     """Folder of the labelled clips that ship with the project."""

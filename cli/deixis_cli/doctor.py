@@ -8,8 +8,9 @@ import time
 from typing import Any
 
 import zenoh
-from deixis_runtime.certificate_check import who_may_not_edit
+from deixis_runtime.certificate_check import read, who_may_not_edit
 from deixis_runtime.certificates import certificates_of
+from deixis_runtime.endpoint import is_guarded
 from deixis_runtime.finding import Finding
 from deixis_runtime.session import Unreachable, open_client
 from deixis_runtime.unanswered import why_unanswered
@@ -60,20 +61,27 @@ def examine(endpoint: str, robot: str) -> list[Finding]:
     """Findings about the router and the robot's system behind it, the router's first."""
     try:
         with open_client(endpoint, shared_memory=False) as session:
-            return [Finding("ok", f"the router at {endpoint} answers"), *_examine(session, robot)]
+            return [Finding("ok", f"the router at {endpoint} answers"), *_examine(session, robot, ask_of_rights(endpoint))]
     except Unreachable as error:
         return [error.why or why_unanswered(endpoint, certificates_of())]
 
 
-def _examine(session: zenoh.Session, robot: str) -> list[Finding]:
+def ask_of_rights(endpoint: str) -> str:
+    """What to ask where a session is opened and nothing is heard: access control denies without a word."""
+    certificates = certificates_of()
+    if certificates is None or not is_guarded(endpoint):
+        return "Does access control deny liveliness and gets to us?"
+    return f"Of rights: is {read(certificates).common_name} on the list of that router (access.json)?"
+
+
+def _examine(session: zenoh.Session, robot: str, denied: str) -> list[Finding]:
     inbox = Inbox()
     listened = (topics.HEALTH.key(robot, stage="*"), *(topic.key(robot) for topic in LISTENED))
     subscribers = [session.declare_subscriber(key, inbox.store) for key in listened]
     began_s = time.monotonic()
     system = look(session, robot, CPU_OVER_S)
     if not system.processes:
-        advice = "is the robot's name right? Does access control deny liveliness and gets to us?"
-        return [Finding("wrong", f"no stage of robot '{robot}' is alive or answers", advice)]
+        return [Finding("wrong", f"no stage of robot '{robot}' is alive or answers", f"is the robot's name right? {denied}")]
     fusion = any(process.stage == topics.POI.stage and process.health is not None for process in system.processes)
     reach = edits_reach_fusion(session, robot) if fusion else None
     time.sleep(max(0.0, LISTEN_S - (time.monotonic() - began_s)))

@@ -85,9 +85,9 @@ def get_pois(session: zenoh.Session, robot: str, poi_id: str = "**", timeout_s: 
     return sorted((poi for _, poi in found), key=lambda poi: poi.poi_id)
 
 
-def get_names(session: zenoh.Session, robot: str) -> dict[str, str]:
+def get_names(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) -> dict[str, str]:
     """Names of the POIs by id; empty where fusion does not answer."""
-    return {poi.poi_id: poi.name for poi in get_pois(session, robot) or []}
+    return {poi.poi_id: poi.name for poi in get_pois(session, robot, timeout_s=timeout_s) or []}
 
 
 def get_healths(session: zenoh.Session, robot: str, timeout_s: float = TIMEOUT_S) -> list[Health]:

@@ -14,11 +14,10 @@ import zenoh
 from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
-from deixis_runtime.supervisor_health import STAGE as SUPERVISOR
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
-from .gets import get_healths, get_names, get_raw, get_state
+from .gets import TIMEOUT_S, get_healths, get_names, get_raw, get_state
 from .inbox import Inbox, Received
 from .mcap_file import McapFileError, McapRecorder
 from .play_end import PlayEnd
@@ -29,6 +28,7 @@ log = logging.getLogger("deixis-play")
 
 TURN_S = 0.05
 SETTLE_S = 4.0
+STOPPED_ANSWER_S = 0.2
 MAX_TARGETS = 1000
 
 OnMessage = Callable[[str, Message], None]
@@ -186,7 +186,7 @@ class Playback:
         if message is None:
             return
         self._counts[type(message).__name__] += 1
-        if isinstance(message, Health) and message.stage != SUPERVISOR:
+        if isinstance(message, Health) and message.stage != topics.SUPERVISOR:
             self.result.health[message.stage] = message
         if isinstance(message, Target) and message.final:
             self._targets.append(message)
@@ -199,15 +199,17 @@ class Playback:
             self._counts["unanswered"] += 1
             log.warning("%s: the last frame was not answered", path)
         deadline_s = time.monotonic() + SETTLE_S
+        # Who told us to stop does not wait for a stage that hangs.
+        answer_s = STOPPED_ANSWER_S if self.interrupts.requested() else TIMEOUT_S
         while topics.STATE.stage in self._options.stages:
-            self.result.state = state = get_state(host.session, self._options.robot) or self.result.state
+            self.result.state = state = get_state(host.session, self._options.robot, answer_s) or self.result.state
             self._turn(host)
             if not self._ended() or self._has_all(state) or time.monotonic() > deadline_s:
                 break
         if topics.POI.stage in self._options.stages:
-            self.result.names = get_names(host.session, self._options.robot)
-        for health in get_healths(host.session, self._options.robot):
-            if health.stage != SUPERVISOR:  # it is we, and say in `failure` what is worth saying
+            self.result.names = get_names(host.session, self._options.robot, answer_s)
+        for health in get_healths(host.session, self._options.robot, answer_s):
+            if health.stage != topics.SUPERVISOR:  # it is we, and say in `failure` what is worth saying
                 self.result.health[health.stage] = health
 
     def _ended(self) -> bool:

@@ -20,6 +20,7 @@ from deixis_schemas.topics import By, Delivery, Topic
 from .frame_groups import Line, by_frame
 from .inbox import Inbox, read_message
 from .mcap_file import McapFileError, McapReader
+from .pace import Pace
 from .raw_message import RawMessage
 from .restamp import Restamper
 
@@ -111,16 +112,19 @@ class Replayer:
             log.warning("'%s' was cut off while it was written; it has been played as far as it goes", self._path)
 
     def _play_at_own_rate(self, lines: Iterator[Line], instance: str) -> None:
-        start: tuple[int, float, Restamper] | None = None
+        pace, began_s = Pace(), time.monotonic()
+        restamper: Restamper | None = None
         for line in lines:
-            if start is None:
-                shift_ns = time.time_ns() - line.received_ns
-                start = line.received_ns, time.monotonic(), Restamper(shift_ns, time.time_ns() // 1_000_000, instance)
-            first_ns, began_s, restamper = start
-            due_s = began_s + (line.received_ns - first_ns) / 1e9
-            if self._stop.wait(max(0.0, due_s - time.monotonic())):
+            after_s = pace.after_s(line)
+            if self._stop.wait(max(0.0, began_s + after_s - time.monotonic())):
                 return
-            self._say(line, restamper.now(line.message) if line.message is not None else None)
+            message = line.message
+            if restamper is None and isinstance(message, OfFrame | CameraInfo):
+                # What was stamped `late` ns before it was heard is so again.
+                late_ns = 0 if pace.by_stamps else line.received_ns - message.stamp_ns
+                shift_ns = time.time_ns() - late_ns - message.stamp_ns
+                restamper = Restamper(shift_ns, time.time_ns() // 1_000_000, instance)
+            self._say(line, restamper.now(message) if restamper and message is not None else message)
 
     def _feed(self, group: list[Line]) -> None:
         """Say all of one frame, and wait for the answers of those who run."""

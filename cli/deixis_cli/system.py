@@ -9,7 +9,6 @@ from typing import Literal
 
 import zenoh
 from deixis_runtime.clock_offset import Exchange, Offset, estimate
-from deixis_runtime.supervisor_health import STAGE as SUPERVISOR
 from deixis_runtime.versions import versions_of
 from deixis_schemas import topics
 from deixis_schemas.messages import CameraInfo, Health, State
@@ -103,8 +102,8 @@ def look(session: zenoh.Session, robot: str, cpu_over_s: float = 0.0) -> System:
         )
         for who in sorted(tokens | set(after), key=_in_order)
     ]
-    supervisors = [process for process in processes if process.stage == SUPERVISOR]
-    processes = [process for process in processes if process.stage != SUPERVISOR]
+    supervisors = [process for process in processes if process.stage == topics.SUPERVISOR]
+    processes = [process for process in processes if process.stage != topics.SUPERVISOR]
     cameras, _ = get_all(session, topics.CAMERA_INFO.key(robot), CameraInfo)
     state = get_state(session, robot)
     camera = cameras[0][1] if cameras else None

@@ -144,10 +144,11 @@ def _edits() -> list[Grant]:
 
 
 def _sends(robot: str, stages: Iterable[str], published: list[Topic]) -> list[Grant]:
-    """What is allowed to a host that these stages of the robot run on."""
+    """What is allowed to a host that these stages of the robot run on, under a supervisor."""
+    processes = (*stages, topics.SUPERVISOR)
     answered = [topic for topic in published if topic.queryable]
-    health = tuple(topics.HEALTH.key(robot, stage=stage) for stage in stages)
-    alive = tuple(topics.alive_key(robot, stage, ANY) for stage in stages)
+    health = tuple(topics.HEALTH.key(robot, stage=name) for name in processes)
+    alive = tuple(topics.alive_key(robot, name, ANY) for name in processes)
     return [
         Grant("ingress", DATA, (*_keys(robot, published), *health)),
         Grant("ingress", ("declare_queryable", "reply"), (*_keys(robot, answered), *health)),

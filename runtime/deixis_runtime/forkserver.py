@@ -89,7 +89,7 @@ def _become(function: Callable[..., int], request: dict[str, Any], go: int) -> N
         if not os.read(go, 1):
             raise SystemExit("the supervisor is gone")
         os.close(go)
-        os.setsid()
+        os.setpgid(0, 0)
         sys.argv = request["argv"]
         # `ps` and `top` show the command that was asked for. Before the environment changes, beside which the title lies.
         setproctitle(" ".join([os.path.basename(sys.argv[0]), *sys.argv[1:]]))

@@ -29,12 +29,13 @@ from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
 from .stage import Node
 from .supervisor import Supervisor
-from .supervisor_health import STAGE, account_of
+from .supervisor_health import account_of
 from .watchdog import Patience
 
 log = logging.getLogger("deixis-supervisor")
 
 POLL_S = 0.02
+START_S = 30.0
 HELD_PERIOD_S = 0.5
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
@@ -209,7 +210,7 @@ class Host:
         path = Path(self.endpoint.removeprefix("unixsock-stream/"))
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
-        self._node = Node(self.session, STAGE, self._node_options(), alone=False)
+        self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
@@ -246,8 +247,7 @@ class Host:
         return command
 
     def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], set[str]]) -> None:
-        ready_s = self.options.patience.ready_s
-        deadline = time.monotonic() + ready_s
+        deadline = time.monotonic() + START_S
         while not ready():
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
@@ -255,7 +255,7 @@ class Host:
             if self._stopped():
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
-                raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
+                raise HostFailed(f"not ready within {START_S:g} s: {', '.join(sorted(missing()))}")
             self._tell(time.monotonic())
             time.sleep(POLL_S)
 

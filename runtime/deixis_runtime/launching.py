@@ -48,8 +48,12 @@ class Child(Protocol):
 
 
 def start_process(argv: Sequence[str], environment: Mapping[str, str]) -> Child:
-    """A process from nothing. It gets its own session, so that Ctrl-C reaches the supervisor alone. Raises OSError."""
-    return subprocess.Popen(list(argv), stdin=subprocess.DEVNULL, start_new_session=True, env={**ENVIRONMENT, **environment})
+    """A process from nothing. Raises OSError.
+
+    It gets its own process group, so that Ctrl-C reaches the supervisor alone; and no session of its own, for then the kernel
+    continues one that was stopped when its supervisor has been killed.
+    """
+    return subprocess.Popen(list(argv), stdin=subprocess.DEVNULL, process_group=0, env={**ENVIRONMENT, **environment})
 
 
 class ForkedChild:
@@ -120,7 +124,7 @@ class ForkServer:
         with theirs:
             self._asked = ours
             try:
-                self._process = subprocess.Popen(argv, stdin=theirs.fileno(), start_new_session=True, env=environment)
+                self._process = subprocess.Popen(argv, stdin=theirs.fileno(), process_group=0, env=environment)
                 ours.send(json.dumps([item.target for item in self._forkables]).encode())
                 answer = self._answer(IMPORTS_WITHIN_S)
             except (OSError, ValueError) as error:

@@ -74,7 +74,13 @@ class Readers:
         self._readers = {who: reader for who, reader in self._readers.items() if now_s - reader.heard_s < REMEMBERED_S}
         if new or now_s >= self._next_s:
             self._next_s = now_s + ASK_EVERY_S
-            self._session.get(self._selector, self._note, timeout=TIMEOUT_S, priority=GET_PRIORITY)
+            self._session.get(
+                self._selector,
+                self._note,
+                timeout=TIMEOUT_S,
+                priority=GET_PRIORITY,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
 
     def elsewhere(self) -> set[str]:
         """Names of the other hosts on which somebody listens; in brackets the stage where a process has not said yet."""

@@ -25,10 +25,14 @@ from .memory import settle
 from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE, setup_logging
-from .two_links import two_links
+from .two_links import two_links, without_settings
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
+# Closing a link that was cut with bytes in its socket takes Zenoh up to 10 s (SO_LINGER, fixed when it was built), on one of
+# the two threads that receive. Two such links, as one robot has, and the router is deaf to all its clients for so long: their
+# supervisor takes them for hung. So there are threads for the links of eight robots that are cut at once.
+RUNTIME = "(rx: (worker_threads: 18))"
 OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
 TURN_S = 0.1
@@ -81,6 +85,7 @@ def main(argv: list[str] | None = None) -> int:
     given = parser.parse_args(argv)
     setup_logging()
     zenoh.init_log_from_env_or("error")
+    os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
     parent = Parent(os.environ) if given.supervised else None
     with Interrupts() as interrupts:
         status = _route(given, interrupts, parent)
@@ -108,7 +113,7 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | N
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
-    _watch_links(session, listen, LinkWatch(connect, certificates), interrupts, parent)
+    _watch_links(session, listen, LinkWatch(without_settings(connect), certificates), interrupts, parent)
     close(session)
     return 0
 

@@ -22,6 +22,8 @@ from .tls import tls_settings
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_MS = 2000
+# A router that ended is back within half a second; Zenoh's own pauses between two tries are one second, two and four.
+RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 CLOSE_TIMEOUT_S = 3.0
 # A session that publishes a message of this size or more lays out 16 MB of shared memory for such. Below it shared memory is no
 # faster; Zenoh's own limit of 3 kB made a stage pay for a busy room's contours.
@@ -57,6 +59,7 @@ def client_config(endpoint: str, *, shared_memory: bool = True) -> zenoh.Config:
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("connect/timeout_ms", json.dumps(CONNECT_TIMEOUT_MS))
     config.insert_json5("connect/exit_on_failure", "true")
+    config.insert_json5("connect/retry", json.dumps(RETRY))
     certificates = certificates_of()
     if certificates is not None and is_guarded(endpoint):
         put_settings(config, {f"transport/link/tls/{name}": value for name, value in tls_settings(certificates).items()})

@@ -49,8 +49,8 @@ MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 class Node:
     """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
 
-    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, alone: bool = True) -> None:
-        """`alone`: a robot has one process of this name, and it is said where there are more."""
+    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, is_stage: bool = True) -> None:
+        """`is_stage`: a robot has one process of this name, and it is said where there are more; its state is logged."""
         self.producer = Producer(stage, options.instance)
         self.robot = options.robot
         self.site = options.site
@@ -77,7 +77,7 @@ class Node:
         self._certificate = CertificateWatch(certificates) if certificates is not None else None
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
-        self._alone = alone
+        self._is_stage = is_stage
         self._doubles: set[str] = set()
         self._token: Any = None
         self._health = self.publish(topics.HEALTH)
@@ -231,7 +231,7 @@ class Node:
         # By state, not by reason: a reason that counts seconds would be a line each step. A state that comes and goes is
         # limited, too; the heartbeat then says later where it has come to rest.
         state, reason = self._heartbeat.state, self._heartbeat.reason
-        if state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
+        if not self._is_stage or state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
             return
         self._logged_state = state
         self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
@@ -242,7 +242,7 @@ class Node:
         self._look_at_queues()
         self._look_at_clocks()
         self._look_at_certificate()
-        if self._alone:
+        if self._is_stage:
             self._look_at_doubles()
         self._health.put(self._record())
         if not self._router():
@@ -279,7 +279,8 @@ class Node:
         settle()
         # Only now, when all subscribers stand: whoever waits for the token may publish at once.
         self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
-        self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
+        if self._is_stage:
+            self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
 
     def _frames_clock(self) -> ClockWatch | None:
         if self._clock_of_frames is None and not self.lockstep:

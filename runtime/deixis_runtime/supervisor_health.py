@@ -9,9 +9,6 @@ from deixis_schemas.messages import HealthState
 
 from .supervisor import Process
 
-STAGE = "supervisor"
-"""The name under which a supervisor gives its health, in place of a stage's."""
-
 
 @dataclass(frozen=True)
 class Account:

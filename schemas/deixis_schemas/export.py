@@ -1,6 +1,6 @@
 """Writes what other languages need of the contract: JSON Schema and golden bytes of every type, and the topic table.
 
-python -m deixis_schemas.export schemas/contract
+python -m deixis_schemas.export schemas/contract docs/contract.md
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from . import codec
+from .contract_page import contract_page
 from .messages import TYPES, Message
 from .samples import SAMPLES
 from .topics import TOPICS
@@ -59,10 +60,13 @@ def main() -> None:
     """Write the contract folder."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("folder", type=Path)
-    folder: Path = parser.parse_args().folder
+    parser.add_argument("page", type=Path, help="the same for people")
+    given = parser.parse_args()
+    folder: Path = given.folder
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in contract_files().items():
         (folder / name).write_bytes(content)
+    given.page.write_text(contract_page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -583,7 +583,7 @@ class ClockHealth(Part):
 
 
 class Health(Produced):
-    """Heartbeat of a stage. `count` advances only while its loop runs.
+    """Heartbeat of a stage, or of the supervisor of a host's stages. `count` advances only while its loop runs.
 
     `stamp_ns` is the time of the answer where it answers a get: clocks of hosts are compared by it.
     """

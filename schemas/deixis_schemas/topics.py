@@ -35,6 +35,7 @@ class Topic:
     """One row of the table. `path` follows `deixis/{robot}/`; `{stage}` and `{id}` in it are filled in by `key`.
 
     `max_bytes` bounds the payload, also of a reply to a get. `max_age_s`: older ones are dropped by those who listen.
+    `silence`: what it means when nothing comes, as one sentence.
     """
 
     path: str
@@ -45,6 +46,7 @@ class Topic:
     queryable: bool = False
     max_bytes: int = 1 << 20
     max_age_s: float | None = None
+    silence: str = ""
 
     @property
     def version(self) -> int:
@@ -64,17 +66,106 @@ class Topic:
 # A link that was cut gives out what it held back, seconds late, when it is mended.
 MAX_AGE_S = 1.0
 
-FRAME = Topic("camera/frame", m.Frame, By.FRAME, 30.0, Delivery.BULK_NEWEST, max_bytes=128 << 20, max_age_s=MAX_AGE_S)
-CAMERA_INFO = Topic("camera/info", m.CameraInfo, By.CHANGE, None, Delivery.KEEP, queryable=True)
-TRACKS = Topic("tracker/tracks", m.Tracks, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
-HEAD_POSES = Topic("headpose/poses", m.HeadPoses, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
-GESTURES = Topic("gesture/gestures", m.Gestures, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
-BELIEF = Topic("fusion/belief", m.Belief, By.FRAME, 30.0, Delivery.NEWEST, max_age_s=MAX_AGE_S)
-TARGET = Topic("fusion/target", m.Target, By.EPISODE, None, Delivery.KEEP_URGENT)
-STATE = Topic("fusion/state", m.State, By.GET, None, Delivery.REPLY, queryable=True, max_bytes=4 << 20)
-POI = Topic("fusion/poi/{id}", m.Poi, By.CHANGE, None, Delivery.KEEP, queryable=True, max_bytes=64 << 10)
-ROBOT_POSE = Topic("robot/pose", m.RobotPose, By.RATE, None, Delivery.NEWEST)
-HEALTH = Topic("{stage}/health", m.Health, By.RATE, 1.0, Delivery.KEEP, queryable=True)
+FRAME = Topic(
+    "camera/frame",
+    m.Frame,
+    By.FRAME,
+    30.0,
+    Delivery.BULK_NEWEST,
+    max_bytes=128 << 20,
+    max_age_s=MAX_AGE_S,
+    silence="No picture: the source ended, failed or stalled, as `camera/info` says; or the camera and its token are gone.",
+)
+CAMERA_INFO = Topic(
+    "camera/info",
+    m.CameraInfo,
+    By.CHANGE,
+    None,
+    Delivery.KEEP,
+    queryable=True,
+    silence="Nothing has changed since the last one; who has none yet asks by get.",
+)
+TRACKS = Topic(
+    "tracker/tracks",
+    m.Tracks,
+    By.FRAME,
+    30.0,
+    Delivery.NEWEST,
+    max_age_s=MAX_AGE_S,
+    silence="The tracker had no time for that frame, or is gone. A frame with nobody in it is answered by an empty list.",
+)
+HEAD_POSES = Topic(
+    "headpose/poses",
+    m.HeadPoses,
+    By.FRAME,
+    30.0,
+    Delivery.NEWEST,
+    max_age_s=MAX_AGE_S,
+    silence="As of tracks: fusion waits for its age limit, and then decides without heads and says so.",
+)
+GESTURES = Topic(
+    "gesture/gestures",
+    m.Gestures,
+    By.FRAME,
+    30.0,
+    Delivery.NEWEST,
+    max_age_s=MAX_AGE_S,
+    silence="As of tracks: fusion waits for its age limit, and then decides without gestures and says so.",
+)
+BELIEF = Topic(
+    "fusion/belief",
+    m.Belief,
+    By.FRAME,
+    30.0,
+    Delivery.NEWEST,
+    max_age_s=MAX_AGE_S,
+    silence="No tracks came: nobody looks at pictures, or fusion is gone. Nobody in sight is a belief without persons.",
+)
+TARGET = Topic(
+    "fusion/target",
+    m.Target,
+    By.EPISODE,
+    None,
+    Delivery.KEEP_URGENT,
+    silence="Nobody points. Each pointing gesture ends with one target that says `final`, also where it abstains.",
+)
+STATE = Topic(
+    "fusion/state",
+    m.State,
+    By.GET,
+    None,
+    Delivery.REPLY,
+    queryable=True,
+    max_bytes=4 << 20,
+    silence="No reply: fusion is gone, or access control denies the get.",
+)
+POI = Topic(
+    "fusion/poi/{id}",
+    m.Poi,
+    By.CHANGE,
+    None,
+    Delivery.KEEP,
+    queryable=True,
+    max_bytes=64 << 10,
+    silence="No edit. No reply to a get: no such POI, or fusion is gone; `fusion/state` tells which.",
+)
+ROBOT_POSE = Topic(
+    "robot/pose",
+    m.RobotPose,
+    By.RATE,
+    None,
+    Delivery.NEWEST,
+    silence="The robot stands where the last one, or the site file, says.",
+)
+HEALTH = Topic(
+    "{stage}/health",
+    m.Health,
+    By.RATE,
+    1.0,
+    Delivery.KEEP,
+    queryable=True,
+    silence="For 3 s: the process is hung or gone; its liveliness token tells which.",
+)
 
 TOPICS: tuple[Topic, ...] = (
     FRAME, CAMERA_INFO, TRACKS, HEAD_POSES, GESTURES, BELIEF, TARGET, STATE, POI, ROBOT_POSE, HEALTH,
@@ -82,6 +173,18 @@ TOPICS: tuple[Topic, ...] = (
 
 # The stages that every frame passes, in their order: a row of the table makes one.
 STAGES = tuple(dict.fromkeys(topic.stage for topic in TOPICS if topic.by is By.FRAME))
+
+INPUTS: dict[str, tuple[Topic, ...]] = {
+    "camera": (),
+    "tracker": (FRAME,),
+    "headpose": (FRAME, CAMERA_INFO, TRACKS),
+    "gesture": (CAMERA_INFO, TRACKS),
+    "fusion": (CAMERA_INFO, ROBOT_POSE, POI, TRACKS, HEAD_POSES, GESTURES),
+}
+"""What each stage works on; those about frames in the order in which they come."""
+
+SUPERVISOR = "supervisor"
+"""The name, in place of a stage's, of the process that starts a host's stages: its health says how they fare."""
 
 
 def alive_key(robot: str, stage: str, instance: str) -> str:

@@ -1,16 +1,21 @@
 """The committed contract is what the code says, and old bytes stay readable."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
 import pytest
 from deixis_schemas import codec
+from deixis_schemas.contract_page import contract_page
 from deixis_schemas.export import contract_files
 from deixis_schemas.messages import TYPES
 from deixis_schemas.samples import SAMPLES
+from deixis_schemas.topics import TOPICS
 
-FOLDER = Path(__file__).parents[2] / "schemas" / "contract"
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "schemas" / "contract"
+PAGE = ROOT / "docs" / "contract.md"
 
 
 def test_every_type_has_a_sample():
@@ -19,7 +24,23 @@ def test_every_type_has_a_sample():
 
 @pytest.mark.parametrize("name", sorted(contract_files()))
 def test_the_committed_file_is_current(name):
-    assert (FOLDER / name).read_bytes() == contract_files()[name], "run: python -m deixis_schemas.export schemas/contract"
+    assert (FOLDER / name).read_bytes() == contract_files()[name], "run: make contract"
+
+
+def test_the_page_for_people_is_current_and_leaves_nothing_out():
+    page = PAGE.read_text()
+    assert page == contract_page(), "run: make contract"
+    for topic in TOPICS:
+        assert f"* `{topic.path}`: {topic.silence}" in page
+        assert topic.silence
+    for type_ in TYPES.values():
+        assert all(f"| `{field}` |" in page for field in type_.model_fields)
+
+
+def test_every_link_within_the_page_leads_somewhere():
+    page = PAGE.read_text()
+    headings = {line.lstrip("# ").lower().replace("/", "") for line in page.splitlines() if line.startswith("#")}
+    assert set(re.findall(r"\(#([^)]+)\)", page)) <= headings
 
 
 def test_nothing_else_lies_in_the_contract_folder():

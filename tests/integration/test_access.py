@@ -4,73 +4,22 @@ The test publishes and subscribes as stages and people would. What is denied is 
 behind it, and when that has come the rest would have.
 """
 
-import os
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
 import pytest
 import zenoh
-from deixis_runtime.certificates import VARIABLE
 from deixis_runtime.session import client_config
+from parties import Party, until_heard
 from running import answers, free_port, process, wait_until
-from site_made import YEAR, add, make_site
+from site_made import YEAR, add, holder, make_site
 
-PATIENCE_S = 10.0
+PATIENCE_S = 30.0
 ROBOT = "r1"
 
 
 def key(path, robot=ROBOT):
     return f"deixis/{robot}/{path}"
-
-
-@contextmanager
-def holder(certificates):
-    """As one who has this folder of certificates; none for a program of the host itself."""
-    before = os.environ.pop(VARIABLE, None)
-    if certificates is not None:
-        os.environ[VARIABLE] = str(certificates.folder)
-    try:
-        yield
-    finally:
-        os.environ.pop(VARIABLE, None)
-        if before is not None:
-            os.environ[VARIABLE] = before
-
-
-class Party:
-    """A session of somebody, and what it has heard: key and payload."""
-
-    def __init__(self, session):
-        self.session = session
-        self.heard = []
-        self._declared = []
-
-    def listen(self, expression):
-        def note(sample):
-            self.heard.append((str(sample.key_expr), sample.kind, sample.payload.to_bytes()))
-
-        self._declared.append(self.session.declare_subscriber(expression, note))
-
-    def serve(self, expression):
-        self._declared.append(self.session.declare_queryable(expression, lambda q: q.reply(q.key_expr, b"answer")))
-
-    def live(self, expression):
-        self._declared.append(self.session.liveliness().declare_token(expression))
-
-    def follow(self, expression):
-        def note(sample):
-            self.heard.append((str(sample.key_expr), sample.kind, b""))
-
-        self._declared.append(self.session.liveliness().declare_subscriber(expression, note, history=True))
-
-    def put(self, expression, payload=b"x"):
-        self.session.put(expression, payload)
-
-    def asks(self, selector):
-        return [r.ok.payload.to_bytes() for r in self.session.get(selector, timeout=0.5) if r.ok is not None]
-
-    def names(self):
-        return {key for key, _, _ in self.heard}
 
 
 class Site:
@@ -116,12 +65,12 @@ MEMBERS = {
 }
 FRAME, INFO, TARGET = (key(path) for path in ("camera/frame", "camera/info", "fusion/target"))
 PUBLISHED = (
-    *("camera/frame", "camera/info", "camera/health", "robot/pose"),
+    *("camera/frame", "camera/info", "camera/health", "supervisor/health", "robot/pose"),
     *("tracker/tracks", "tracker/health", "headpose/poses", "gesture/gestures"),
     *("fusion/belief", "fusion/target", "fusion/poi/P1", "fusion/health"),
 )
-BY_CAMERA = {"camera/frame", "camera/info", "camera/health", "robot/pose"}
-BY_STAGES = set(PUBLISHED) - BY_CAMERA
+BY_CAMERA = {"camera/frame", "camera/info", "camera/health", "supervisor/health", "robot/pose"}
+BY_STAGES = set(PUBLISHED) - BY_CAMERA | {"supervisor/health"}
 READABLE = set(PUBLISHED) - {"camera/frame"}
 ASKED = ("camera/info", "camera/health", "*/health", "fusion/state", "fusion/poi/P1", "fusion/poi/P1?op=put", "camera/frame")
 ANSWERED = {"camera/info", "camera/health", "*/health", "fusion/state"}
@@ -146,16 +95,6 @@ def stages(site):
     party = site.party(at="edge")
     party.serve("deixis/**")
     return party
-
-
-def until_heard(listener, expression, send):
-    """Send again and again until the listener has heard it: a subscription takes a moment on its way."""
-
-    def heard():
-        send()
-        return expression in listener.names()
-
-    wait_until(heard, f"{expression} is heard", PATIENCE_S)
 
 
 def heard_of(listener, sender, last, robot=ROBOT):

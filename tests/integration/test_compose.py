@@ -2,10 +2,11 @@
 
 import os
 import shutil
+import signal
 import subprocess
 
 import pytest
-from running import ROOT, free_port
+from running import ROOT, child_called, free_port, wait_until
 
 BASE = "python:3.11-slim-bookworm"
 STAND_IN = ROOT.parent / "shared" / "tools" / "base-image"
@@ -13,6 +14,7 @@ STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
 ROUTER = "unixsock-stream//run/deixis/router.sock"
 BUILD_TIMEOUT_S = 900
 RUN_TIMEOUT_S = 240
+PATIENCE_S = 60
 
 
 def run(*argv, timeout=60, check=True, **environment):
@@ -56,6 +58,19 @@ def containers(project, service):
     return run("docker", "ps", "--format", "{{.Names}}", *filters).stdout.split()
 
 
+def inspected(container, template):
+    """What the engine says of a container."""
+    return run("docker", "inspect", "--format", template, container).stdout.strip()
+
+
+def hang(container, word):
+    """Stop the process of a container that has the word in its command line; not the guard above it."""
+    guard = int(inspected(container, "{{.State.Pid}}"))
+    pid = child_called(guard, word)
+    assert pid is not None, f"{container} has no guarded {word}"
+    os.kill(pid, signal.SIGSTOP)
+
+
 @pytest.fixture(scope="module")
 def compose():
     """Runs compose on a project of ours; all of it is removed at the end."""
@@ -95,7 +110,7 @@ def test_the_demo_names_the_poi_and_succeeds(compose):
 
 
 @pytest.mark.usefixtures("images")
-def test_robot_and_edge_name_the_poi_over_a_network(compose):
+def test_robot_and_edge_name_the_poi_over_a_network_also_after_a_stage_hung(compose):
     common = {"DEIXIS_ROBOT": "r1", "DEIXIS_OPTIONS": "--lockstep", "timeout": RUN_TIMEOUT_S}
     compose("deixis-test-edge", "edge", "up", "-d", DEIXIS_PUBLISH=f"127.0.0.1:{free_port()}", **common)
     (edge,) = containers("deixis-test-edge", "router")
@@ -115,6 +130,13 @@ def test_robot_and_edge_name_the_poi_over_a_network(compose):
     wrong = run(*ask, "--seconds", "120", "--expect", "P8", timeout=RUN_TIMEOUT_S, check=False)
     assert wrong.returncode == 1
     assert "expected the one answer 'P8'" in wrong.stderr
+
+    hang(fusion, "deixis-fusion")
+    wait_until(lambda: inspected(fusion, "{{.RestartCount}}") == "1", "the engine starts fusion again", PATIENCE_S)
+    assert "loop runs for 2 s; killing it" in run("docker", "logs", fusion).stderr
+    (gesture,) = containers("deixis-test-edge", "gesture")
+    ask = ("docker", "exec", gesture, "deixis", "poi", "list", "--robot", "r1", "--connect", ROUTER)
+    wait_until(lambda: "the ship model" in run(*ask, check=False).stdout, "it answers the other containers", PATIENCE_S)
 
 
 @pytest.mark.usefixtures("images")

@@ -50,7 +50,7 @@ def test_a_forked_process_is_our_child_under_its_own_name(router):
     assert isinstance(router, ForkedChild)
     assert router.pid in children(os.getpid())
     assert b"python -m deixis_runtime.router --supervised" in Path(f"/proc/{router.pid}/cmdline").read_bytes()
-    assert os.getsid(router.pid) == router.pid
+    assert os.getpgid(router.pid) == router.pid, "Ctrl-C does not reach it"
     with pytest.raises(subprocess.TimeoutExpired):
         router.wait(0.01)
     router.send_signal(signal.SIGTERM)

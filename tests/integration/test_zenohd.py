@@ -1,4 +1,4 @@
-"""The whole chain through a stock zenohd on each of two hosts, in place of our router, with the settings that we ship.
+"""The whole chain through a stock zenohd on each of two hosts, in place of our router, by TLS and with the rules of the site.
 
 There is none among the project's packages. It is built once from its crate (docs/deployment.md) and found on the PATH, or where
 DEIXIS_ZENOHD says.
@@ -7,12 +7,14 @@ DEIXIS_ZENOHD says.
 import json
 import os
 import shutil
+import subprocess
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from running import BIN, CLIP, POINTED_AT, ROOT, SITE, process, tail, wait_until
+from running import BIN, CLIP, POINTED_AT, ROOT, SITE, command, process, tail, wait_until
+from site_made import add, make_site
 from two_hosts import TwoHosts, assert_each_frame_crosses_once, missing_for_two_hosts
 
 ZENOHD = os.environ.get("DEIXIS_ZENOHD") or shutil.which("zenohd")
@@ -23,6 +25,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT
 
 PATIENCE_S = 90.0
 ROBOT = "zenohd-test"
+ADDRESS = "10.77.0.2"
 ON = {"camera": "robot", "tracker": "edge", "headpose": "edge", "gesture": "edge", "fusion": "edge"}
 OF_CAMERA = ("--set", f"source={CLIP}", "--set", "loop=true", "--set", "encoding=bgr8")
 
@@ -37,8 +40,10 @@ class Chain:
     def __enter__(self):
         # A socket's path is limited to about 100 bytes.
         self._sockets = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="zenohd-")))
-        self._run("robot", "zenohd-robot", self._zenohd("robot", "-e", "tcp/10.77.0.2:7447"))
-        self._run("edge", "zenohd-edge", self._zenohd("edge", "-l", "tcp/0.0.0.0:7447"))
+        site = make_site(self._sockets / "site")
+        robot, edge = add(site, f"robot:{ROBOT}").folder, add(site, "edge:pc", ADDRESS).folder
+        self._run("robot", "zenohd-robot", self._zenohd("robot", robot, "-e", f"tls/{ADDRESS}:7447"))
+        self._run("edge", "zenohd-edge", self._zenohd("edge", edge, "-l", "tls/0.0.0.0:7447"))
         for host in ("robot", "edge"):
             wait_until(self._socket(host).exists, f"a zenohd on {host}", PATIENCE_S, self.folder / f"zenohd-{host}")
         self._run("edge", "watch", self._client("edge", "deixis", "watch", "--json"))
@@ -61,8 +66,12 @@ class Chain:
         documents = [json.loads(line) for line in lines if line.startswith("{") and line.endswith("\n")]
         return [document["message"] for document in documents if document["type"] == type_]
 
-    def _zenohd(self, host, *endpoints):
-        return [ZENOHD, "-c", ROOT / "config" / f"{host}.json5", "-l", self._endpoint(host), *endpoints]
+    def _zenohd(self, host, certificates, *endpoints):
+        """As docs/security.md says: our settings with the rules of the site in them."""
+        argv = command("deixis", "certs", "zenohd", certificates, "--config", ROOT / "config" / f"{host}.json5")
+        settings = self._sockets / f"{host}.json"
+        settings.write_text(subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout)
+        return [ZENOHD, "-c", settings, "-l", self._endpoint(host), *endpoints]
 
     def _client(self, host, name, *arguments):
         return [BIN / name, *arguments, "--robot", ROBOT, "--connect", self._endpoint(host)]
@@ -85,7 +94,7 @@ def chain(tmp_path_factory):
             yield it
 
 
-def test_the_poi_is_named_across_two_hosts_with_a_stock_zenohd_on_each(chain):
+def test_the_poi_is_named_across_two_hosts_with_a_stock_zenohd_and_the_rules_of_the_site_on_each(chain):
     def named():
         return any(answer["final"] and answer["poi_ids"] == [POINTED_AT] for answer in chain.heard("Target"))
 

@@ -6,6 +6,7 @@ import pytest
 from deixis_cli.frame_groups import LOOK_AHEAD_NS, Line, by_frame
 from deixis_cli.mcap_file import McapRecorder
 from deixis_cli.options import CommandError
+from deixis_cli.pace import Pace
 from deixis_cli.raw_message import RawMessage
 from deixis_cli.replay import register, run, stages_in
 from deixis_cli.restamp import Restamper
@@ -147,3 +148,35 @@ def test_what_cannot_be_played_is_refused_with_what_to_do(tmp_path, arguments, t
 def test_a_missing_recording_is_named():
     with pytest.raises(CommandError, match=r"none\.mcap"):
         run(given_("none.mcap"))
+
+
+# --- pace -------------------------------------------------------------------------------------------------------------
+
+
+def info(at_ms, *, lockstep):
+    message = SAMPLE["CameraInfo"].model_copy(update={"lockstep": lockstep})
+    return Line(topics.CAMERA_INFO.key("r1"), topics.CAMERA_INFO, message, at_ms * MS)
+
+
+def stamped(seq, at_ms, stamp_ms):
+    message = FRAME.model_copy(update={"run": 1, "seq": seq, "stamp_ns": stamp_ms * MS})
+    return Line(topics.FRAME.key("r1"), topics.FRAME, message, at_ms * MS)
+
+
+def test_messages_come_as_far_apart_as_they_were_heard():
+    pace = Pace()
+    lines = [info(1000, lockstep=False), stamped(0, 1040, 5), stamped(1, 1090, 38)]
+    assert [pace.after_s(item) for item in lines] == pytest.approx([0, 0.040, 0.090])
+
+
+def test_a_recording_of_lockstep_keeps_the_time_of_its_pictures_however_slow_the_machine_was():
+    pace = Pace()
+    lines = [info(0, lockstep=True), stamped(0, 700, 0), stamped(1, 1500, 33), info(1600, lockstep=True), stamped(2, 2900, 66)]
+    assert [pace.after_s(item) for item in lines] == pytest.approx([0, 0, 0.033, 0.033, 0.066])
+
+
+@given(st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 10_000)), min_size=1), st.booleans())
+def test_time_never_goes_back(times, lockstep):
+    pace = Pace()
+    after = [pace.after_s(info(0, lockstep=lockstep)), *(pace.after_s(stamped(0, at, stamp)) for at, stamp in times)]
+    assert after == sorted(after)

@@ -148,7 +148,8 @@ def test_a_role_that_nobody_has_gets_no_rules():
 def test_a_robot_publishes_as_its_own_camera_alone():
     rules = access_control(AccessList(members=MEMBERS))
     assert allowed(rules, "robot:r1", "ingress", "put") == {
-        *("deixis/r1/camera/frame", "deixis/r1/camera/info", "deixis/r1/camera/health", "deixis/r1/robot/pose")
+        *("deixis/r1/camera/frame", "deixis/r1/camera/info", "deixis/r1/camera/health", "deixis/r1/robot/pose"),
+        "deixis/r1/supervisor/health",
     }
     assert "deixis/r2/camera/frame" in allowed(rules, "robot:r2", "ingress", "put")
     assert not [key for key in allowed(rules, "edge", "ingress", "put") if "camera" in key]

@@ -1,0 +1,1 @@
+"""Whether a stage, ours or another, keeps the contract."""

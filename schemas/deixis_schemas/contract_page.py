@@ -1,0 +1,180 @@
+"""The contract as one page for people: from the topic table and the types, so that it says what the code does."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from .messages import TYPES, Message
+from .topics import INPUTS, STAGES, TOPICS, Topic, alive_key
+
+INTRODUCTION = """# The contract
+
+Written by `make contract` from `schemas/deixis_schemas`; edit that. What a stage in any language has to know: keys,
+types, rates, ages, and what silence means. Whether it keeps to it says `deixis check-stage` ([write your own
+stage](swap.md)).
+
+## On the wire
+
+* Keys are `deixis/{robot}/{stage}/{topic}`. A robot's name, an instance, a POI's id are each one part of a key: 1 to 64
+  letters, digits, `_`, `.` and `-`, not beginning with `.` or `-`.
+* A payload is a msgpack map with string keys; binary fields are msgpack `bin`, numbers are what they are (no strings).
+  Its Zenoh encoding is `application/msgpack;Type/version`. Without that label, or with another version, a message is
+  counted, reported and used by nobody.
+* Fields that a reader does not know are ignored, so fields may be added. A field that changes its meaning raises the
+  version, and then both sides are changed together. Optional fields have a default here; a writer may leave them out.
+* A get with `?format=json` is answered in JSON (`application/json`), binary fields in URL-safe base64 (RFC 4648, section
+  5).
+* For each type there are a JSON Schema, golden bytes and the same as JSON in [schemas/contract](../schemas/contract). A
+  schema cannot say all: rules between fields stand in the description of the type below, and the golden bytes are what a
+  codec is to be tried on.
+* Lengths are metres, angles degrees where a field ends in `_deg` (px, Hz, ns alike). Bearings and yaw are measured at the
+  person, from the direction person -> camera, positive toward the image's right: the person's own left (REP-103). Maps
+  follow REP-103, cameras REP-105.
+* `run` and `seq` name a frame. Who derives something from a frame repeats `run`, `seq` and `stamp_ns`, and names itself
+  in `stage` and `instance`. Another `run` is the only sign that a camera begins anew.
+* A stage holds the liveliness token `{alive}` while it works.
+* It works on the newest input that it has and never on a backlog, answers each frame that it works on once, also with an
+  empty list, and drops what is older than the table allows (not where `camera/info` says `lockstep`).
+"""
+
+
+def contract_page() -> str:
+    """The page in Markdown."""
+    text = INTRODUCTION.replace("{alive}", alive_key("{robot}", "{stage}", "{instance}"))
+    return "\n".join([text, *_topics(), *_stages(), *_types()]).rstrip() + "\n"
+
+
+def _topics() -> Iterator[str]:
+    yield "## Topics\n"
+    yield "| key under `deixis/{robot}/` | type | when | by get | most bytes | oldest | delivery |"
+    yield "|---|---|---|---|---|---|---|"
+    for topic in TOPICS:
+        by_get = "yes" if topic.queryable else "no"
+        oldest = f"{topic.max_age_s:g} s" if topic.max_age_s else "-"
+        yield (
+            f"| `{topic.path}` | {_link(_name(topic))} | {_when(topic)} | {by_get} | {_size(topic.max_bytes)} | {oldest} "
+            f"| {topic.delivery.value} |"
+        )
+    yield "\nWhat it means when nothing comes:\n"
+    for topic in TOPICS:
+        yield f"* `{topic.path}`: {topic.silence}"
+    yield ""
+
+
+def _stages() -> Iterator[str]:
+    yield "## Stages\n"
+    yield "| stage | works on | answers each frame on | also |"
+    yield "|---|---|---|---|"
+    for stage in STAGES:
+        own = [topic for topic in TOPICS if topic.stage == stage]
+        by_frame = [topic for topic in own if topic.rate_hz and topic.max_age_s]
+        others = [topic for topic in own if topic not in by_frame]
+        inputs = ", ".join(f"`{topic.path}`" for topic in INPUTS[stage]) or "its source"
+        yield f"| {stage} | {inputs} | {_paths(by_frame)} | {_paths(others)} |"
+    yield ""
+
+
+def _types() -> Iterator[str]:
+    yield "## Types\n"
+    parts: dict[str, dict[str, Any]] = {}
+    for type_ in TYPES.values():
+        schema = type_.model_json_schema()
+        parts |= schema.get("$defs", {})
+        yield from _type(f"{type_.__name__}/{type_.VERSION}", schema, _description(type_))
+    yield "## Parts of messages\n"
+    for name, schema in sorted(parts.items()):
+        yield from _type(name, schema, schema.get("description", ""))
+
+
+def _type(name: str, schema: dict[str, Any], description: str) -> Iterator[str]:
+    yield f"### {name}\n"
+    yield f"{' '.join(description.split())}\n"
+    yield "| field | what | default | |"
+    yield "|---|---|---|---|"
+    required = schema.get("required", [])
+    for field, content in schema.get("properties", {}).items():
+        default = "" if field in required else _default(content)
+        yield f"| `{field}` | {_what(content)} | {default} | {' '.join(content.get('description', '').split())} |"
+    yield ""
+
+
+def _what(content: dict[str, Any]) -> str:
+    """The kind of a value, with its bounds."""
+    if "$ref" in content:
+        return _link(content["$ref"].rsplit("/", 1)[-1])
+    if "anyOf" in content:
+        return " or ".join(_what(option) for option in content["anyOf"])
+    if "enum" in content:
+        return ", ".join(f"`{value}`" for value in content["enum"])
+    return _array(content) if content.get("type") == "array" else _plain(content)
+
+
+def _plain(content: dict[str, Any]) -> str:
+    if isinstance(content.get("additionalProperties"), dict):
+        return f"map of text to {_what(content['additionalProperties'])}"
+    kind = str(content.get("type", "any"))
+    kind = {"null": "none", "string": "text", "object": "map"}.get(kind, kind)
+    return ("bytes" if content.get("format") in ("binary", "base64url") else kind) + _bounds(content)
+
+
+def _array(content: dict[str, Any]) -> str:
+    if "prefixItems" in content:
+        inside = [_what(item) for item in content["prefixItems"]]
+        return f"[{', '.join(inside)}]" if len(set(inside)) > 1 else f"{len(inside)} of: {inside[0]}"
+    most = f", {content['maxItems']} at most" if "maxItems" in content else ""
+    return f"list of {_what(content.get('items', {}))}{most}"
+
+
+def _bounds(content: dict[str, Any]) -> str:
+    words = {
+        "minimum": "from {}", "exclusiveMinimum": "above {}", "maximum": "to {}", "exclusiveMaximum": "below {}",
+        "minLength": "{} long at least", "maxLength": "{} long at most", "pattern": "`{}`",
+    }  # fmt: skip
+    said = [text.format(_number(content[key])) for key, text in words.items() if key in content]
+    return f" ({' '.join(said)})" if said else ""
+
+
+def _number(value: object) -> str:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return "2^63 - 1" if value == 2**63 - 1 else f"{value:g}"
+    return str(value).replace("|", "\\|")
+
+
+def _default(content: dict[str, Any]) -> str:
+    if "default" not in content:
+        return "empty" if content.get("type") in ("array", "object") else "all defaults"
+    value = content["default"]
+    if value is None:
+        return "none"
+    return f"`{json.dumps(value)}`" if value != "" else "empty"
+
+
+def _description(type_: type[Message]) -> str:
+    return type_.__doc__ or ""
+
+
+def _link(heading: str) -> str:
+    return f"[{heading}](#{_anchor(heading)})"
+
+
+def _name(topic: Topic) -> str:
+    return f"{topic.type.__name__}/{topic.version}"
+
+
+def _anchor(heading: str) -> str:
+    """As GitHub and mkdocs make them of a heading."""
+    return heading.lower().replace("/", "")
+
+
+def _when(topic: Topic) -> str:
+    return topic.by.value + (f", {topic.rate_hz:g} Hz" if topic.rate_hz else "")
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
+
+
+def _paths(found: list[Topic]) -> str:
+    return ", ".join(f"`{topic.path}`" for topic in found) or "-"
