@@ -97,7 +97,7 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | N
     security = LinkSecurity(certificates, insecure=given.insecure, frames_stay=given.frames_stay)
     try:
         config = router_config(given.listen, given.connect, given.config, security)
-        listen, connect = endpoints(config, "listen"), endpoints(config, "connect")
+        listen, connect = endpoints(config, "listen"), without_settings(endpoints(config, "connect"))
         for caution in cautions(listen, connect):
             log.warning("%s", caution)
         session = zenoh.open(config)
@@ -112,7 +112,7 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | N
         log.error("cannot listen on %s: %s; is another router there? Choose --listen", where, first_line(error))
         return EXIT_UNREACHABLE
     log.info("listening on %s", ", ".join(given.listen) or "what its configuration says")
-    _watch_links(session, listen, LinkWatch(without_settings(connect), certificates), interrupts, parent)
+    _watch_links(session, listen, LinkWatch(connect, certificates), interrupts, parent)
     close(session)
     return 0
 
