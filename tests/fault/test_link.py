@@ -94,8 +94,7 @@ def test_on_an_8_mbit_link_targets_are_younger_than_500_ms(pair):
     pair.hosts.link(rate_mbit=8.0)
     assert pair.p95_ms_of("Target", 3) < 500
     assert pair.p95_ms_of("Belief", 10) < 500
-    assert pair.quality() < BEST, "it cannot have carried all"
-    assert pair.note().endswith("no more comes in time")
+    pair.wait_until(lambda: 0 < pair.quality() < BEST and pair.note().endswith("no more comes in time"), "less than the best")
 
 
 def test_the_camera_sends_less_over_a_narrow_link_and_more_again_when_it_carries_more(pair):
