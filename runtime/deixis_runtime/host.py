@@ -24,9 +24,10 @@ from .link_security import LinkSecurity, SecurityError
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
 from .procfs import locked_inodes
-from .router import SOCKET_FOLDER_PREFIX, router_config
+from .router import router_config
 from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
+from .socket_folder import PREFIX
 from .stage import Node
 from .supervisor import Supervisor
 from .supervisor_health import account_of
@@ -108,7 +109,7 @@ class Host:
 
     def __enter__(self) -> Self:
         # A socket's path is limited to about 100 bytes, so not below the user's working directory.
-        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=SOCKET_FOLDER_PREFIX)))
+        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
         patience = self.options.patience
         notifications = self._stack.enter_context(Notifications(folder / "notify.sock", patience.silent_s))

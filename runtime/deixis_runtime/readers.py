@@ -66,7 +66,8 @@ class Readers:
     def turn(self) -> None:
         """Take in what was answered; ask now and then, and where a process is new."""
         now_s = time.monotonic()
-        processes = self._alive.processes() - {self._us}
+        # Of others than the contract's stages, as a supervisor, nothing is thought before they have answered.
+        processes = {who for who in self._alive.processes() if who[0] in topics.STAGES and who != self._us}
         new = processes - self._first_seen_s.keys()
         self._first_seen_s = {who: self._first_seen_s.get(who, now_s) for who in processes}
         self._answered &= processes

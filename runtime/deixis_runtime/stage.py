@@ -34,6 +34,7 @@ from .queries import Answer, EditQueue, Query, QueryQueue
 from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
+from .socket_folder import remove_socket_folder
 
 C = TypeVar("C", bound=StageConfig)
 
@@ -253,6 +254,7 @@ class Node:
         self._tell_manager()
         if self._parent is not None and self._parent.gone():
             self.log.error("the supervisor is gone; stopping")
+            remove_socket_folder(self._endpoint)
             self.stop()
         return not self.stopping
 
