@@ -34,6 +34,7 @@ from .queries import Answer, EditQueue, Query, QueryQueue
 from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
+from .socket_folder import remove_socket_folder
 
 C = TypeVar("C", bound=StageConfig)
 
@@ -50,7 +51,7 @@ class Node:
     """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
 
     def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, is_stage: bool = True) -> None:
-        """`is_stage`: a robot has one process of this name; it is said when it is ready, and where there are more."""
+        """`is_stage`: a robot has one process of this name, and it is said where there are more; its state is logged."""
         self.producer = Producer(stage, options.instance)
         self.robot = options.robot
         self.site = options.site
@@ -231,7 +232,7 @@ class Node:
         # By state, not by reason: a reason that counts seconds would be a line each step. A state that comes and goes is
         # limited, too; the heartbeat then says later where it has come to rest.
         state, reason = self._heartbeat.state, self._heartbeat.reason
-        if state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
+        if not self._is_stage or state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
             return
         self._logged_state = state
         self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
@@ -253,6 +254,7 @@ class Node:
         self._tell_manager()
         if self._parent is not None and self._parent.gone():
             self.log.error("the supervisor is gone; stopping")
+            remove_socket_folder(self._endpoint)
             self.stop()
         return not self.stopping
 

@@ -50,7 +50,7 @@ def test_a_forked_process_is_our_child_under_its_own_name(router):
     assert isinstance(router, ForkedChild)
     assert router.pid in children(os.getpid())
     assert b"python -m deixis_runtime.router --supervised" in Path(f"/proc/{router.pid}/cmdline").read_bytes()
-    assert os.getsid(router.pid) == router.pid
+    assert os.getpgid(router.pid) == router.pid, "Ctrl-C does not reach it"
     with pytest.raises(subprocess.TimeoutExpired):
         router.wait(0.01)
     router.send_signal(signal.SIGTERM)
@@ -107,6 +107,15 @@ def test_what_cannot_be_imported_or_starts_a_thread_is_not_forked(tmp_path, monk
         assert server.targets == {GESTURE.target}
     with ForkServer([GESTURE, Forkable(("threaded",), "threaded:main")]) as server:
         assert server.targets == frozenset()
+
+
+def test_who_is_told_to_stop_does_not_wait_for_imports(tmp_path, monkeypatch):
+    (tmp_path / "endless.py").write_text("import time\ntime.sleep(60)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    began_s = time.monotonic()
+    with ForkServer([Forkable(("endless",), "endless:main")], stopped=lambda: True) as server:
+        assert server.targets == frozenset()
+    assert time.monotonic() - began_s < 10
 
 
 def test_the_router_and_all_stages_of_ours_are_forked():
