@@ -6,13 +6,12 @@ behind it, and when that has come the rest would have.
 
 import sys
 from contextlib import ExitStack
-from datetime import timedelta
 
 import pytest
 import zenoh
-from deixis_runtime.session import client_config, open_client
+from deixis_runtime.session import client_config
 from parties import Party, until_heard
-from running import answers, command, free_port, get_one, process, wait_until
+from running import answers, free_port, process, wait_until
 from site_made import YEAR, add, holder, make_site
 
 PATIENCE_S = 30.0
@@ -256,17 +255,3 @@ def test_a_name_that_is_off_the_list_is_given_nothing(site, stages):
         viewer.listen(TARGET)
         until_heard(viewer, TARGET, lambda: stages.put(TARGET))
         assert party.heard == []
-
-
-def test_a_stage_shows_in_its_health_that_the_certificate_of_its_host_expires_soon(site, tmp_path):
-    soon, socket = add(site.site, "edge:soon", "127.0.0.1", lasts=timedelta(days=9)), site.sockets["edge"]
-    argv = command("deixis-gesture", "--robot", "soon", "--connect", socket)
-    with holder(soon), process(argv, tmp_path / "log"), open_client(socket, shared_memory=False) as session:
-
-        def note():
-            health = get_one(session, "deixis/soon/gesture/health") or {}
-            return next((said for said in health.get("notes", []) if said.startswith("the certificate edge:soon in ")), None)
-
-        said = wait_until(note, "a note in health", PATIENCE_S, tmp_path / "log")
-    assert "expires in 8 days" in said or "expires in 9 days" in said
-    assert "WARNING the certificate edge:soon" in (tmp_path / "log").read_text()
