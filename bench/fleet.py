@@ -13,7 +13,7 @@ with _N for N robots, over the measured seconds:
 * answered: beliefs by frames played, complete: beliefs that had to do without no stage, by beliefs; late_ms: the latest that a
   robot was to play a frame: where it is large, this machine was full;
 * targets: answers to pointings, right: those that name what that robot's recording points at, under the robot's own name of it,
-  none: those that name nothing, as is due where too few frames come through, wrong: all others;
+  unsure: those that name nothing, or that one with others, as is due where too few frames come through; wrong: all others;
 * foreign: beliefs and targets on a robot's keys that are not its own: of another's run, or with a POI of another. After each
   measurement each robot's registry is edited, and then all have to hold their own POIs and that one.
 The exit is 1 where any robot heard another, was not answered at all, or was answered wrongly more than once in ten.
@@ -186,7 +186,7 @@ def measure(count: int, seconds: float, interrupts: Interrupts) -> dict[str, flo
     failures = [player.failure for player in players if player.failure]
     if failures:
         raise FleetFailed("; ".join(failures))
-    for what in said.foreign[:5]:
+    for what in [*said.foreign[:5], *wrong_answers(said, robots)[:5]]:
         print(f"bench/fleet: {what}", file=sys.stderr)
     late_ms = 1000 * max(player.late_s for player in players)
     return {
@@ -274,10 +274,25 @@ def of_answers(said: Said, robots: Sequence[Robot], frames: int) -> dict[str, fl
         "robots_unanswered": sum(not answered[robot.name] for robot in robots),
         "targets": len(said.finals),
         "right": sum(target.poi_ids == answers[name] for name, target in said.finals),
-        "none": sum(not target.poi_ids for _, target in said.finals),
-        "wrong": sum(bool(target.poi_ids) and target.poi_ids != answers[name] for name, target in said.finals),
+        "unsure": sum(target.poi_ids != answers[name] and not is_wrong(target, answers[name]) for name, target in said.finals),
+        "wrong": sum(is_wrong(target, answers[name]) for name, target in said.finals),
         "foreign": len(said.foreign),
     }
+
+
+def wrong_answers(said: Said, robots: Sequence[Robot]) -> list[str]:
+    """The answers that name something else than the recording points at, in words."""
+    answers = {robot.name: robot.answer for robot in robots}
+    return [
+        f"{name}: {', '.join(target.poi_ids)} for {', '.join(answers[name])}: {target.reason}"
+        for name, target in said.finals
+        if is_wrong(target, answers[name])
+    ]
+
+
+def is_wrong(target: Target, answer: list[str]) -> bool:
+    """Whether it names something without what was pointed at; nothing, or that among others, is unsure and not wrong."""
+    return bool(target.poi_ids) and not set(answer) <= set(target.poi_ids)
 
 
 def faults_of(count: int, figures: dict[str, float]) -> list[str]:

@@ -90,7 +90,7 @@ def measure(source: Path, site: Path, seconds: float) -> dict[str, float]:
         watch(host, seconds)
         after = {name: usage(pid) for name, pid in pids.items()}
         heard = beliefs.take()
-        restarted = [name for name, process in host.supervisor.processes.items() if process.restarts]
+        restarted = [name for name, process in host.supervisor.processes.items() if process.started > 1]
         subscribers.clear()
     if restarted:
         raise HostFailed(f"restarted while measured: {', '.join(restarted)}")

@@ -22,6 +22,8 @@ LONGEST_FIRST = (
     "test_rehearsal.py",
     "test_two_hosts.py",
     "test_link.py",
+    "test_supervision_faults.py",
+    "test_access.py",
     "test_systemd.py",
     "test_garbage.py",
     "test_zenoh_cli.py",

@@ -26,7 +26,7 @@ GET_TIMEOUT_S = 20.0
 
 def command(endpoint: str, what: str, count: int, *keys: str) -> list[str]:
     """The command line of such a process. It gives way to all others."""
-    return ["nice", "-n", "10", sys.executable, str(Path(__file__)), endpoint, what, str(count), *keys]
+    return ["nice", "-n", "5", sys.executable, str(Path(__file__)), endpoint, what, str(count), *keys]
 
 
 def puts(session: zenoh.Session, count: int, keys: Sequence[str]) -> Counter[str]:

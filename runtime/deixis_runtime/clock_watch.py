@@ -83,7 +83,9 @@ class ClockWatch:
                 with self._lock:
                     self._answers.append((asked_ns, returned_ns, reply.ok.payload.to_bytes(), str(reply.ok.encoding)))
 
-        self._session.get(self.key, note, timeout=TIMEOUT_S, priority=GET_PRIORITY)
+        self._session.get(
+            self.key, note, timeout=TIMEOUT_S, priority=GET_PRIORITY, congestion_control=zenoh.CongestionControl.DROP
+        )
 
     def _take_answers(self) -> None:
         with self._lock:

@@ -24,9 +24,10 @@ from .link_security import LinkSecurity, SecurityError
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
 from .procfs import locked_inodes
-from .router import SOCKET_FOLDER_PREFIX, router_config
+from .router import router_config
 from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
+from .socket_folder import PREFIX
 from .stage import Node
 from .supervisor import Supervisor
 from .supervisor_health import account_of
@@ -35,6 +36,7 @@ from .watchdog import Patience
 log = logging.getLogger("deixis-supervisor")
 
 POLL_S = 0.02
+START_S = 30.0
 HELD_PERIOD_S = 0.5
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
@@ -107,7 +109,7 @@ class Host:
 
     def __enter__(self) -> Self:
         # A socket's path is limited to about 100 bytes, so not below the user's working directory.
-        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=SOCKET_FOLDER_PREFIX)))
+        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
         patience = self.options.patience
         notifications = self._stack.enter_context(Notifications(folder / "notify.sock", patience.silent_s))
@@ -136,7 +138,8 @@ class Host:
         give up waiting. Raises HostFailed when one of them ends or is not ready in time.
         """
         self._stopped = stopped
-        self.supervisor.launch = self._stack.enter_context(ForkServer(self.forkables() if self.options.fork else [])).start
+        forks = ForkServer(self.forkables() if self.options.fork else [], stopped)
+        self.supervisor.launch = self._stack.enter_context(forks).start
         self._start_router()
         self._start_stages(tuple(name for name in self.options.stages if name != SOURCE))
         if before_frames:
@@ -245,8 +248,7 @@ class Host:
         return command
 
     def _wait_until(self, ready: Callable[[], bool], missing: Callable[[], set[str]]) -> None:
-        ready_s = self.options.patience.ready_s
-        deadline = time.monotonic() + ready_s
+        deadline = time.monotonic() + START_S
         while not ready():
             ended = [p for p in self.supervisor.processes.values() if not p.running]
             if ended:
@@ -254,7 +256,7 @@ class Host:
             if self._stopped():
                 raise HostFailed("stopped while starting")
             if time.monotonic() > deadline:
-                raise HostFailed(f"not ready within {ready_s:g} s: {', '.join(sorted(missing()))}")
+                raise HostFailed(f"not ready within {START_S:g} s: {', '.join(sorted(missing()))}")
             self._tell(time.monotonic())
             time.sleep(POLL_S)
 

@@ -11,7 +11,8 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
@@ -19,8 +20,10 @@ from .environment import ENVIRONMENT
 
 log = logging.getLogger("deixis-supervisor")
 
-IMPORTS_WITHIN_S = 20.0
+IMPORTS_WITHIN_S = 60.0
+"""Usually half a second; on a machine that is overloaded tens of them."""
 FORKS_WITHIN_S = 1.0
+STOP_POLL_S = 0.1
 MAX_ANSWER = 1 << 16
 PR_SET_CHILD_SUBREAPER = 36
 
@@ -104,8 +107,10 @@ class ForkServer:
     depends on it.
     """
 
-    def __init__(self, forkables: Sequence[Forkable]) -> None:
+    def __init__(self, forkables: Sequence[Forkable], stopped: Callable[[], bool] = lambda: False) -> None:
+        """`stopped` says whether to give up waiting for its imports."""
         self._forkables = forkables
+        self._stopped = stopped
         self._process: subprocess.Popen[bytes] | None = None
         self._asked: socket.socket | None = None
         self._loaded: frozenset[str] = frozenset()
@@ -170,8 +175,16 @@ class ForkServer:
     def _answer(self, within_s: float) -> dict[str, Any]:
         """Raises OSError or ValueError where there is none."""
         assert self._asked is not None
-        self._asked.settimeout(within_s)
-        answer = json.loads(self._asked.recv(MAX_ANSWER))
+        deadline_s = time.monotonic() + within_s
+        while not select.select([self._asked], [], [], STOP_POLL_S)[0]:
+            if self._stopped():
+                raise ValueError("stopped meanwhile")
+            if time.monotonic() > deadline_s:
+                raise ValueError(f"no answer within {within_s:g} s")
+        packed = self._asked.recv(MAX_ANSWER)
+        if not packed:
+            raise ValueError("it has ended")
+        answer = json.loads(packed)
         if not isinstance(answer, dict):
             raise ValueError("no map")
         return answer

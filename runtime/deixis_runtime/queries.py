@@ -114,7 +114,7 @@ class QueryQueue:
         return query
 
     def _answer_one(self, query: zenoh.Query) -> Iterator[None]:
-        """Give the replies one by one."""
+        """Give the replies one by one; with the last one it is over, and the asker waits no longer."""
         try:
             yield from self._replies(query)
         except Refused as error:
@@ -131,7 +131,7 @@ class QueryQueue:
             self._report("reply", f"{query.key_expr}: cannot reply: {error}")
 
     def _replies(self, query: zenoh.Query) -> Iterator[None]:
-        """Give the replies one by one. Raises Refused, zenoh.ZError."""
+        """Give the replies, with a pause between each two. Raises Refused, zenoh.ZError."""
         parameters = {str(name): str(value) for name, value in dict(query.parameters).items()}  # type: ignore[call-overload]
         wanted = parameters.get("format", "msgpack")
         if wanted not in ("msgpack", "json"):
@@ -140,14 +140,15 @@ class QueryQueue:
         if payload is not None and len(payload) > self._topic.max_bytes:
             raise Refused(f"payload: {oversize(len(payload), self._topic)}")
         encoding = str(query.encoding) if query.encoding is not None else ""
-        for key, message in self._answer(Query(str(query.key_expr), parameters, payload, encoding)):
+        for number, (key, message) in enumerate(self._answer(Query(str(query.key_expr), parameters, payload, encoding))):
+            if number > 0:
+                yield
             content = codec.encode_json(message) if wanted == "json" else codec.encode(message)
             if len(content) > self._topic.max_bytes:
                 what = f"{key}: reply of {oversize(len(content), self._topic)}"
                 self._report(f"reply size {key}", what)
                 raise Refused(f"{what}; ask for less, with ?top=N or ?poi=ID")
             query.reply(key, content, encoding=codec.JSON if wanted == "json" else codec.encoding_of(type(message)))
-            yield
 
 
 def _size(query: zenoh.Query) -> int:

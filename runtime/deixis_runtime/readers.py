@@ -66,7 +66,8 @@ class Readers:
     def turn(self) -> None:
         """Take in what was answered; ask now and then, and where a process is new."""
         now_s = time.monotonic()
-        processes = self._alive.processes() - {self._us}
+        # Of others than the contract's stages, as a supervisor, nothing is thought before they have answered.
+        processes = {who for who in self._alive.processes() if who[0] in topics.STAGES and who != self._us}
         new = processes - self._first_seen_s.keys()
         self._first_seen_s = {who: self._first_seen_s.get(who, now_s) for who in processes}
         self._answered &= processes
@@ -74,7 +75,13 @@ class Readers:
         self._readers = {who: reader for who, reader in self._readers.items() if now_s - reader.heard_s < REMEMBERED_S}
         if new or now_s >= self._next_s:
             self._next_s = now_s + ASK_EVERY_S
-            self._session.get(self._selector, self._note, timeout=TIMEOUT_S, priority=GET_PRIORITY)
+            self._session.get(
+                self._selector,
+                self._note,
+                timeout=TIMEOUT_S,
+                priority=GET_PRIORITY,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
 
     def elsewhere(self) -> set[str]:
         """Names of the other hosts on which somebody listens; in brackets the stage where a process has not said yet."""

@@ -9,7 +9,6 @@ import argparse
 import json
 import logging
 import os
-import shutil
 import time
 from pathlib import Path
 
@@ -24,15 +23,19 @@ from .manager import Manager
 from .memory import settle
 from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
+from .socket_folder import remove_socket_folder
 from .stage import EXIT_CONFIG, EXIT_UNREACHABLE, setup_logging
-from .two_links import two_links
+from .two_links import two_links, without_settings
 
 # A cut link is noticed after the lease; Zenoh's default of 10 s is long for a robot.
 LEASE_MS = 2000
+# Closing a link that was cut with bytes in its socket takes Zenoh up to 10 s (SO_LINGER, fixed when it was built), on one of
+# the two threads that receive. Two such links, as one robot has, and the router is deaf to all its clients for so long: their
+# supervisor takes them for hung. So there are threads for the links of eight robots that are cut at once.
+RUNTIME = "(rx: (worker_threads: 18))"
 OPEN_TIMEOUT_MS = 2000
 CHECK_S = 1.0
 TURN_S = 0.1
-SOCKET_FOLDER_PREFIX = "deixis-"
 
 log = logging.getLogger("deixis-router")
 
@@ -81,6 +84,7 @@ def main(argv: list[str] | None = None) -> int:
     given = parser.parse_args(argv)
     setup_logging()
     zenoh.init_log_from_env_or("error")
+    os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
     parent = Parent(os.environ) if given.supervised else None
     with Interrupts() as interrupts:
         status = _route(given, interrupts, parent)
@@ -93,7 +97,7 @@ def _route(given: argparse.Namespace, interrupts: Interrupts, parent: Parent | N
     security = LinkSecurity(certificates, insecure=given.insecure, frames_stay=given.frames_stay)
     try:
         config = router_config(given.listen, given.connect, given.config, security)
-        listen, connect = endpoints(config, "listen"), endpoints(config, "connect")
+        listen, connect = endpoints(config, "listen"), without_settings(endpoints(config, "connect"))
         for caution in cautions(listen, connect):
             log.warning("%s", caution)
         session = zenoh.open(config)
@@ -121,7 +125,8 @@ def _watch_links(
     while not interrupts.requested():
         if parent is not None and parent.gone():
             log.error("the supervisor is gone; stopping")
-            _remove_socket_folders(listen)
+            for endpoint in listen:
+                remove_socket_folder(endpoint)
             return
         if time.monotonic() >= look_s:
             look_s = time.monotonic() + CHECK_S
@@ -138,14 +143,6 @@ def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:
     except OSError as error:
         if limit.allow("manager", time.monotonic()) is not None:
             log.warning("NOTIFY_SOCKET: nobody hears that the router is alive: %s", error.strerror)
-
-
-def _remove_socket_folders(listen: list[str]) -> None:
-    """The temporary folder of a supervisor that was killed: nobody else is left to remove it."""
-    for endpoint in listen:
-        folder = Path(endpoint.removeprefix("unixsock-stream/")).parent
-        if endpoint.startswith("unixsock-stream/") and folder.name.startswith(SOCKET_FOLDER_PREFIX):
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _endpoints(value: object) -> list[str]:

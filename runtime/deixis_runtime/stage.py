@@ -34,6 +34,7 @@ from .queries import Answer, EditQueue, Query, QueryQueue
 from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
+from .socket_folder import remove_socket_folder
 
 C = TypeVar("C", bound=StageConfig)
 
@@ -43,6 +44,8 @@ IDLE_WAIT_S = 0.25
 # A signal handler may set a plain attribute only (`threading.Event.set` can deadlock in one): `wait` looks this often.
 STOP_POLL_S = 0.1
 ANSWERING_S = 0.01
+# Who looks on through a new router hears of us when it has its subscriptions, too, and not a whole period later.
+LINK_SETTLES_S = 0.25
 MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 
 
@@ -50,7 +53,7 @@ class Node:
     """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
 
     def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, is_stage: bool = True) -> None:
-        """`is_stage`: a robot has one process of this name; it is said when it is ready, and where there are more."""
+        """`is_stage`: a robot has one process of this name, and it is said where there are more; its state is logged."""
         self.producer = Producer(stage, options.instance)
         self.robot = options.robot
         self.site = options.site
@@ -65,6 +68,7 @@ class Node:
         self._event = threading.Event()
         self._limit = RateLimit()
         self._logged_state: HealthState = "ok"
+        self._linked_to = ""
         self._heartbeat = Heartbeat(self.producer)
         self._patient_puts = PatientPuts(self._go_on) if options.lockstep else None
         self._inputs: list[Subscription] = []
@@ -160,6 +164,7 @@ class Node:
         """Wait for input, at most `timeout_s` and often less; answer gets and send the heartbeat. False: stop the stage."""
         if self._token is None:
             self._declare_alive()
+        self._look_at_link()
         self._event.wait(min(timeout_s, self._heartbeat.due_in_s(), STOP_POLL_S))
         self._event.clear()
         # A flood of gets takes this much of each turn, and the stage's own work the rest.
@@ -231,7 +236,7 @@ class Node:
         # By state, not by reason: a reason that counts seconds would be a line each step. A state that comes and goes is
         # limited, too; the heartbeat then says later where it has come to rest.
         state, reason = self._heartbeat.state, self._heartbeat.reason
-        if state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
+        if not self._is_stage or state == self._logged_state or self._limit.allow(f"state {state}", time.monotonic()) is None:
             return
         self._logged_state = state
         self.log.log(logging.INFO if state == "ok" else logging.WARNING, "%s%s", state, f": {reason}" if reason else "")
@@ -248,11 +253,18 @@ class Node:
         if not self._router():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
 
+    def _look_at_link(self) -> None:
+        router = self._router()
+        if router and router != self._linked_to:
+            self._heartbeat.hasten(LINK_SETTLES_S)
+        self._linked_to = router
+
     def _go_on(self) -> bool:
         """Give a sign that the loop runs, and say whether it is to go on."""
         self._tell_manager()
         if self._parent is not None and self._parent.gone():
             self.log.error("the supervisor is gone; stopping")
+            remove_socket_folder(self._endpoint)
             self.stop()
         return not self.stopping
 

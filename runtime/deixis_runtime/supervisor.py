@@ -19,7 +19,7 @@ log = logging.getLogger("deixis-supervisor")
 
 STOP_TIMEOUT_S = 1.2
 KILL_TIMEOUT_S = 0.5
-SETTLED_S = 5.0
+SETTLED_S = 15.0  # longer than a start may take: who hangs in it is ended by then
 SIGNALS = {number.value: number.name for number in signal.Signals}
 
 

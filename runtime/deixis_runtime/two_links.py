@@ -10,6 +10,11 @@ BUFFER = "so_sndbuf=65536"
 PROTOCOLS = ("tcp/", "tls/")
 
 
+def without_settings(endpoints: list[str]) -> list[str]:
+    """The addresses among the endpoints, each once: for people, who gave one."""
+    return list(dict.fromkeys(endpoint.partition("#")[0].partition("?")[0] for endpoint in endpoints))
+
+
 def two_links(endpoint: str) -> list[str]:
     """The endpoints to connect to in place of this one; itself where it has priorities already, or its protocol no streams.
 

@@ -15,7 +15,7 @@ class Patience:
     because the process could not run (other work took the processor, or a disk its time).
     """
 
-    ready_s: float = 30.0
+    ready_s: float = 10.0
     silent_s: float = 0.8
     watched_s: float = 0.25
     unable_s: float = 10.0

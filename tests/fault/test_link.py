@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT
 
 BENCH = str(Path(__file__).parents[2] / "bench")
 GOOD = {"delay_ms": 0.0, "loss": 0.0, "rate_mbit": 0.0}
-BEST = 100
+BEST, LEAST = 100, 50
 CAMERA = {"quality": BEST, "rate_hz": 10, "adapt_least_rate_hz": 5}
 AGE_LIMIT_S = 1.0
 PATIENCE_S = 60.0
@@ -46,8 +46,9 @@ class RobotAndEdge:
         return next((note for note in healths[-1]["notes"] if note.startswith("sends ")), "") if healths else ""
 
     def quality(self):
+        """That of the JPEGs; 0 while nothing is known."""
         found = re.search(r"JPEGs of quality (\d+)", self.note())
-        return int(found[1]) if found else None
+        return int(found[1]) if found else 0
 
     def p95_ms_of(self, kind, least):
         """95th percentile of the ages of the next messages, so many at least."""
@@ -68,7 +69,7 @@ def pair(tmp_path_factory):
     with TwoHosts("robot", "edge") as hosts, Layout("adapted", hosts, folder, CLIP, SITE, CAMERA, frames=True) as layout:
         two = RobotAndEdge(hosts, layout, Heard(layout.heard["edge"]), Heard(layout.heard["robot"]))
         two.wait_until(lambda: two.heard("Belief"), "a belief")
-        two.wait_until(lambda: two.quality() == BEST, "the camera's best on a good link")
+        two.wait_until(lambda: two.quality() > LEAST, "more than the least on a good link")
         yield two
 
 
@@ -93,12 +94,14 @@ def test_on_an_8_mbit_link_targets_are_younger_than_500_ms(pair):
     pair.hosts.link(rate_mbit=8.0)
     assert pair.p95_ms_of("Target", 3) < 500
     assert pair.p95_ms_of("Belief", 10) < 500
-    assert pair.quality() < BEST, "it cannot have carried all"
-    assert pair.note().endswith("no more comes in time")
+    pair.wait_until(lambda: 0 < pair.quality() < BEST and pair.note().endswith("no more comes in time"), "less than the best")
 
 
-def test_the_camera_sends_its_best_again_when_the_link_carries_it(pair):
-    pair.wait_until(lambda: pair.quality() == BEST, "the camera's best")
+def test_the_camera_sends_less_over_a_narrow_link_and_more_again_when_it_carries_more(pair):
+    pair.hosts.link(rate_mbit=2.0)
+    pair.wait_until(lambda: pair.quality() == LEAST, "the least quality")
+    pair.hosts.link(**GOOD)
+    pair.wait_until(lambda: pair.quality() > LEAST, "more quality")
 
 
 def test_with_20_ms_and_one_percent_of_packets_lost_targets_are_younger_than_500_ms(pair):

@@ -18,7 +18,7 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import MAX_REGISTERED, Belief, State
 from fusion_bench import Bench, camera_info, fusion_bench, messages_of, router, wait_until
 
-FLOOD_S = 60
+FLOOD_S = 240
 PERIOD_S = 1 / 30
 IN_TIME_MS = 300
 # What a container or unit of a stage may hold is 512 MB.

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 import pytest
 from deixis_cli.checks import CLOCK_ADVICE
 from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Target
-from running import CLIP, POINTED_AT, ROOT, SITE, System, answers, child_called, command, free_port, process, wait_until
+from held_link import HeldLink
+from running import CLIP, POINTED_AT, ROOT, SITE, System, answers, command, free_port, process, wait_until
 
 ROBOT = "skewed-clock"
 AHEAD_S, BEHIND_S = 300.0, -420.0
@@ -24,8 +25,11 @@ RATE_HZ = 10
 PATIENCE_S = 60.0
 
 
+@dataclass(frozen=True)
 class SkewedSystem(System):
-    """The system, and the clock of its camera's host."""
+    """The system, the link to its camera's host, and the clock there."""
+
+    link: HeldLink
 
     def set_clock(self, ahead_s):
         """Set that clock so far ahead of the true time, seconds."""
@@ -33,6 +37,7 @@ class SkewedSystem(System):
         new.write_text(str(ahead_s))
         new.rename(self.log.parent / "ahead")
 
+    @contextmanager
     def answers_from_now(self):
         """Final answers that come from now on, a list that grows."""
         heard = []
@@ -42,8 +47,9 @@ class SkewedSystem(System):
             if target.final:
                 heard.append(target)
 
-        self.listening = self.session.declare_subscriber(self.key(topics.TARGET.path), hear)
-        return heard
+        subscriber = self.session.declare_subscriber(self.key(topics.TARGET.path), hear)
+        yield heard
+        subscriber.undeclare()
 
     def clock_as_seen_by_fusion(self):
         """(seconds ahead, by how much that may be wrong) of the camera's clock; none while it is not known."""
@@ -53,18 +59,19 @@ class SkewedSystem(System):
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    folder, endpoint = tmp_path_factory.mktemp("skewed"), f"tcp/127.0.0.1:{free_port()}"
+    folder, port = tmp_path_factory.mktemp("skewed"), free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
     (folder / "ahead").write_text(str(AHEAD_S))
     edge = command("deixis", "up", "--except", "camera", "--robot", ROBOT, "--site", SITE, "--listen", endpoint)
     settings = {"source": CLIP, "loop": "true", "rate_hz": RATE_HZ, "encoding": "jpeg", "adapt": "false"}
     camera = [sys.executable, ROOT / "tests" / "skewed_clock.py", folder / "ahead", "deixis_camera.service"]
-    camera += ["--robot", ROBOT, "--connect", endpoint, "--site", SITE]
-    camera += [part for name, value in settings.items() for part in ("--set", f"{name}={value}")]
     with process([*edge, "--registry", folder / "pois.sqlite"], folder / "log") as child:
         wait_until(lambda: child.poll() is not None or answers(endpoint), "a router", PATIENCE_S, folder / "log")
-        with process(camera, folder / "camera"), open_client(endpoint, shared_memory=False) as session:
-            it = SkewedSystem(ROBOT, endpoint, session, child, folder / "log")
-            yield it
+        with HeldLink(port) as link, open_client(endpoint, shared_memory=False) as session:
+            camera += ["--robot", ROBOT, "--connect", f"tcp/127.0.0.1:{link.port}", "--site", SITE]
+            camera += [part for name, value in settings.items() for part in ("--set", f"{name}={value}")]
+            with process(camera, folder / "camera"):
+                yield SkewedSystem(ROBOT, endpoint, session, child, folder / "log", link)
 
 
 def assert_named(running, answers):
@@ -88,23 +95,31 @@ def assert_skew_is_said(running, ahead_s, in_words):
 
     running.wait_until(known, f"fusion to know that the camera's clock is {ahead_s:g} s ahead")
     pattern = rf"the clock of host \S+ \(camera\) is {in_words} that of host \S+"
-    running.wait_until(lambda: any(re.search(pattern, note) for note in running.health("fusion")["notes"]), "health to say it")
-    assert re.search(pattern, running.log.read_text())
+    running.wait_until(
+        lambda: any(re.search(pattern, note) for note in running.health("fusion").get("notes", ())), "health to say it"
+    )
     found = [finding for finding in doctor(running) if re.search(pattern, finding["what"])]
     assert [finding["advice"] for finding in found if finding["level"] == "wrong"] == [CLOCK_ADVICE]
 
 
 def test_a_camera_whose_clock_is_five_minutes_ahead_gives_answers_and_the_skew_is_said_in_health_and_by_doctor(running):
-    assert_named(running, running.answers_from_now())
+    with running.answers_from_now() as heard:
+        assert_named(running, heard)
     assert_skew_is_said(running, AHEAD_S, r"5 min 0 s ahead of")
+    assert "(camera) is 5 min 0 s ahead of" in running.log.read_text()
+
+
+def published_by_tracker(running):
+    health = running.wait_until(lambda: running.health("tracker"), "health of the tracker")
+    return next(item["published"] for item in health["outputs"] if item["key"] == running.key(topics.TRACKS.path))
 
 
 def test_a_clock_that_is_set_back_by_twelve_minutes_stops_no_answers_and_the_new_skew_is_said(running):
-    frames = running.health("tracker")["outputs"][0]["published"]
-    heard = running.answers_from_now()
+    frames = published_by_tracker(running)
     running.set_clock(BEHIND_S)
-    running.wait_until(lambda: running.health("tracker")["outputs"][0]["published"] > frames + 2 * RATE_HZ, "frames go on")
-    assert_named(running, heard)
+    with running.answers_from_now() as heard:
+        running.wait_until(lambda: published_by_tracker(running) > frames + 2 * RATE_HZ, "frames go on")
+        assert_named(running, heard)
     assert_skew_is_said(running, BEHIND_S, r"7 min 0 s behind")
 
 
@@ -112,23 +127,17 @@ def too_old(running, stage):
     return sum(item["too_old"] for item in running.health(stage).get("inputs", []))
 
 
-def stop_for(pid, seconds):
-    os.kill(pid, signal.SIGSTOP)
-    time.sleep(seconds)
-    os.kill(pid, signal.SIGCONT)
-
-
 def test_what_waited_longer_than_the_age_limit_is_dropped_by_a_skewed_clock_as_by_a_true_one(running):
-    router = child_called(running.child.pid, "deixis_runtime.router")
     before = too_old(running, "tracker")
 
     def dropped():
-        # Frames wait in the connection; for less than the lease, so that no session ends.
-        stop_for(router, 1.7)
+        # For less than the lease, so that the session stands.
+        running.link.hold_for(1.6)
         deadline = time.monotonic() + 2
         while too_old(running, "tracker") == before and time.monotonic() < deadline:
             time.sleep(0.1)
         return too_old(running, "tracker") > before
 
     running.wait_until(dropped, "frames dropped for their age")
-    assert_named(running, running.answers_from_now())
+    with running.answers_from_now() as heard:
+        assert_named(running, heard)

@@ -14,7 +14,7 @@ from deixis_cli.doctor import examine
 from deixis_runtime.session import Unreachable, client_config, open_client
 from deixis_runtime.tls import tls_settings
 from deixis_runtime.unanswered import why_unanswered
-from running import answers, free_port, process, wait_until
+from running import answers, command, free_port, get_one, process, wait_until
 from site_made import add, holder, make_site
 
 PATIENCE_S = 30.0
@@ -27,7 +27,7 @@ class Edge:
 
     def __init__(self, folder, certificates, stack):
         self.endpoint = f"tls/127.0.0.1:{free_port()}"
-        inside = f"unixsock-stream/{folder}/socket"
+        self.inside = inside = f"unixsock-stream/{folder}/socket"
         argv = [sys.executable, "-m", "deixis_runtime.router", "--listen", inside, "--listen", self.endpoint]
         with holder(certificates):
             stack.enter_context(process(argv, folder / "log"))
@@ -201,3 +201,17 @@ def test_a_robots_router_says_why_it_is_refused(edge, site, tmp_path):
         log = tmp_path / "log"
         wait_until(lambda: "ERROR the certificate robot:old" in log.read_text(), "the reason", PATIENCE_S, log)
         assert f"no link yet to {edge.endpoint}" in log.read_text()
+
+
+def test_a_stage_shows_in_its_health_that_the_certificate_of_its_host_expires_soon(edge, site, tmp_path):
+    soon = add(site, "edge:soon", "127.0.0.1", lasts=timedelta(days=9))
+    argv = command("deixis-gesture", "--robot", "soon", "--connect", edge.inside)
+    with holder(soon), process(argv, tmp_path / "log"), open_client(edge.inside, shared_memory=False) as session:
+
+        def note():
+            health = get_one(session, "deixis/soon/gesture/health") or {}
+            return next((said for said in health.get("notes", []) if said.startswith("the certificate edge:soon in ")), None)
+
+        said = wait_until(note, "a note in health", PATIENCE_S, tmp_path / "log")
+    assert "expires in 8 days" in said or "expires in 9 days" in said
+    assert "WARNING the certificate edge:soon" in (tmp_path / "log").read_text()

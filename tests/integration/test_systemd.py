@@ -7,6 +7,7 @@ import time
 
 import pytest
 from running import CLIP, POINTED_AT, ROOT, SITE, wait_until
+from site_made import add, make_site
 from systemd_host import CHECKOUT, UNIT_PATH, SystemdHost, missing_for_systemd_host
 
 WHY_NOT = missing_for_systemd_host()
@@ -19,27 +20,36 @@ SOCKET = "unixsock-stream//run/deixis/router.sock"
 PATIENCE_S = 60.0
 AGAIN_S = 5.0  # 2 s of silence and 0.2 s of a pause, and the rest for a busy machine
 ROBOT = "r1"
+GUARDED = "tls/127.0.0.1:7448"
+ONE_MACHINE = "--config /etc/deixis/one_machine.json5 --listen tcp/127.0.0.1:7447"
 
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory):
     """Both targets started, on the example clip played again and again."""
     with SystemdHost(tmp_path_factory.mktemp("systemd")) as made:
-        made.run(["sh", "-euc", f"cd /checkout\n{install_commands()}"])
+        made.run(["sh", "-euc", f"cd /checkout\n{commands_with('systemd-sysusers')}"])
         settings = (ROOT / "systemd" / "deixis.env").read_text().replace("DEIXIS_ROBOT=\n", f"DEIXIS_ROBOT={ROBOT}\n")
         assert f"DEIXIS_ROBOT={ROBOT}" in settings
         # In lockstep, so that a busy machine plays the clip slowly and drops nothing.
-        (made.share / "deixis.env").write_text(settings.replace("/etc/deixis/site.yaml", f"{on_host(SITE)} --lockstep"))
+        settings = settings.replace("/etc/deixis/site.yaml", f"{on_host(SITE)} --lockstep")
+        assert ONE_MACHINE in settings
+        settings = settings.replace(ONE_MACHINE, f"--config /etc/deixis/edge.json5 --listen {GUARDED}")
+        (made.share / "deixis.env").write_text(f"{settings}\nDEIXIS_CERTS=/etc/deixis/certs\n")
         (made.share / "camera.env").write_text(f'DEIXIS_STAGE_OPTIONS="--set source={on_host(CLIP)} --set loop=true"\n')
+        site = make_site(made.share / "site")
+        add(site, "edge:pc", "127.0.0.1")
+        add(site, "viewer:anna")
+        made.run(["sh", "-euc", "cd /share/site\n" + commands_with("/etc/deixis/certs/").replace("robot-r1", "edge-pc")])
         made.run(["cp", "/share/deixis.env", "/share/camera.env", "/etc/deixis/"])
         made.run(["systemctl", "start", *TARGETS])
         yield made
 
 
-def install_commands():
-    """The block of the page that installs the units, word for word."""
+def commands_with(word):
+    """The block of the page in which the word stands, word for word."""
     page = (ROOT / "docs" / "deployment.md").read_text()
-    (block,) = [block for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL) if "systemd-sysusers" in block]
+    (block,) = [block for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL) if word in block]
     return block
 
 
@@ -104,6 +114,16 @@ def test_the_units_run_without_privileges_network_or_a_root_to_write_to(host):
         inside = ["nsenter", "-t", pid, "-m", "-S", status["Uid"].split()[0], "--"]
         refused = host.run([*inside, "touch", "/var/lib/x", "/etc/x"], check=False)
         assert refused.stderr.count("Read-only file system") == 2, unit
+
+
+def test_another_host_comes_by_mutual_tls(host):
+    """By the certificate of a viewer, through the listener that faces the network."""
+    argv = ["deixis", "status", "--robot", ROBOT, "--connect", GUARDED]
+    status = host.run([*argv, "--certs", "/share/site/viewer-anna"])
+    assert all(stage in status.stdout for stage in STAGES)
+    refused = host.run(argv, check=False)
+    assert refused.returncode == 1
+    assert "TLS needs a certificate" in refused.stderr
 
 
 def test_memory_is_limited(host):

@@ -77,20 +77,21 @@ def test_what_is_heard_is_held_against_the_robot_on_whose_key_it_came():
     said = understood(heard, {robot.name: robot for robot in robots})
     figures = of_answers(said, robots, frames=2)
     assert (figures["targets"], figures["right"], figures["foreign"], figures["robots_unanswered"]) == (3, 2, 1, 2)
-    assert (figures["none"], figures["wrong"]) == (0, 1)
+    assert (figures["unsure"], figures["wrong"]) == (0, 1)
     assert len(faults_of(2, figures)) == 3
     assert faults_of(2, figures | {"wrong": 0, "foreign": 0, "robots_unanswered": 0}) == []
     assert len(faults_of(2, figures | {"wrong": 0, "right": 0, "foreign": 0, "robots_unanswered": 0})) == 1
 
 
-def test_an_answer_that_names_nothing_is_none_and_not_a_wrong_one():
+def test_an_answer_that_names_nothing_or_the_right_one_among_others_is_unsure_and_not_wrong():
     from fleet import of_answers, understood
     from fleet_recording import fleet
 
     (robot,) = fleet(1, first_run=5)
-    heard = [(1, Sample(robot, target(robot, poi_ids=[])))]
+    named = ([], [*robot.answer, "r00.P1"], robot.answer, ["r00.P1"])
+    heard = [(1, Sample(robot, target(robot, poi_ids=poi_ids))) for poi_ids in named]
     figures = of_answers(understood(heard, {robot.name: robot}), [robot], frames=1)
-    assert (figures["right"], figures["none"], figures["wrong"]) == (0, 1, 0)
+    assert (figures["unsure"], figures["right"], figures["wrong"]) == (2, 1, 1)
 
 
 @pytest.mark.parametrize("text", ["", "0", "17", "1,x", "1,,2"])

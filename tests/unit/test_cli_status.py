@@ -35,3 +35,26 @@ def test_a_process_that_neither_answers_nor_is_heard_is_called_hung(producers):
     system = beside(GUEST, producers)
     assert states(system)["headpose"] == "hung"
     assert "headpose: its process is alive but gives no answer: hung or stopped" in remarks(system)
+
+
+def supervisor(host, state="ok", reason="", notes=()):
+    health = Health(
+        stamp_ns=1, stage="supervisor", instance=host, count=9, state=state, reason=reason, pid=1, host=host, uptime_s=60,
+        cpu_s=6, rss_mb=50, notes=list(notes),
+    )  # fmt: skip
+    return StageProcess("supervisor", host, True, health)
+
+
+def test_what_supervisors_have_done_and_given_up_is_shown_and_one_on_each_host_is_no_double(capsys):
+    note, reason = "fusion: started again 2 times; the last end, 12 s ago: killed by SIGKILL", "gesture is given up: ..."
+    supervisors = [supervisor("robot", notes=[note]), supervisor("edge", "degraded", reason)]
+    system = System("r1", beside(GUEST, ["headpose/swap-7"]).processes, supervisors=supervisors)
+    assert f"supervisor: {note}" in remarks(system)
+    assert f"supervisor: degraded: {reason}" in remarks(system)
+    assert system.doubled() == []
+    assert [(item["instance"], item["state"]) for item in document(system, "x")["supervisors"]] == [
+        ("robot", "ok"),
+        ("edge", "degraded"),
+    ]
+    print_system(system)
+    assert capsys.readouterr().out.count("supervisor ") >= 2

@@ -146,9 +146,9 @@ def test_past_its_time_one_reply_is_given_and_the_rest_when_it_is_called_again(l
     first, second = Asked(), Asked()
     queue.store(first)
     queue.store(second)
-    for replies in (1, 2, 3):
+    for replies, over in ((1, False), (2, False), (3, True)):
         assert queue.answer_until(0.0), "there is more to do"
-        assert (len(first.replies), first.dropped) == (replies, False)
+        assert (len(first.replies), first.dropped) == (replies, over)
     while queue.answer_until(0.0):
         pass
     assert [key for key, *_ in first.replies] == [key for key, *_ in second.replies] == keys

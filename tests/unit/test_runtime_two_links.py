@@ -4,7 +4,7 @@ import json
 
 import pytest
 from deixis_runtime.router import router_config
-from deixis_runtime.two_links import two_links
+from deixis_runtime.two_links import two_links, without_settings
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,10 @@ from deixis_runtime.two_links import two_links
 )
 def test_answers_get_a_connection_beside_that_of_the_frames(endpoint, links):
     assert two_links(endpoint) == links
+
+
+def test_people_are_told_of_the_one_address_that_they_gave():
+    assert without_settings([*two_links("tls/edge:7447"), "tcp/other:1"]) == ["tls/edge:7447", "tcp/other:1"]
 
 
 def test_who_allows_one_link_only_makes_one(tmp_path):

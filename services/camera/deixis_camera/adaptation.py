@@ -37,7 +37,7 @@ USABLE = 0.85
 """Of the bytes a second that came through, to leave room for those that vary."""
 MOST_UP = 2
 """Rungs up at once on the way back, which is less than twice the bytes; else one."""
-FIRST_HOLD_S = 2.0
+FIRST_HOLD_S = 1.0
 LONGEST_HOLD_S = 30.0
 TRIED_S = 10.0
 """Trouble so soon after a step up means that the step was too much: a queue may grow slowly."""
