@@ -18,6 +18,7 @@ SHARED = ROOT.parent / "shared"
 
 # Two workers take file by file: one that takes minutes must not be the last. These begin, by how long they took.
 LONGEST_FIRST = (
+    "test_gesture_rust.py",
     "test_compose.py",
     "test_rehearsal.py",
     "test_two_hosts.py",
