@@ -9,7 +9,7 @@ DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headp
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract references clean
+.PHONY: setup demo test check bench contract references zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -50,6 +50,13 @@ contract: setup
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup
 	@$(BIN)/python -m deixis_evaluation.references examples/clips tests/replay/references
+
+# A stock zenohd for the tests that run the chain through one: built once from its crate, into the user's cache.
+ZENOHD_ROOT := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/deixis/zenohd
+zenohd:
+	@command -v cargo >/dev/null || { echo "make: building zenohd needs cargo" >&2; exit 1; }
+	cargo install --quiet zenohd --version 1.10.2 --root $(ZENOHD_ROOT)
+	@echo "$(ZENOHD_ROOT)/bin/zenohd"
 
 clean:
 	rm -rf .venv build dist

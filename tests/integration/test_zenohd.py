@@ -1,12 +1,6 @@
-"""The whole chain through a stock zenohd on each of two hosts, in place of our router, by TLS and with the rules of the site.
-
-There is none among the project's packages. It is built once from its crate (docs/deployment.md) and found on the PATH, or where
-DEIXIS_ZENOHD says.
-"""
+"""The whole chain through a stock zenohd on each of two hosts, in place of our router, by TLS and the rules of the site."""
 
 import json
-import os
-import shutil
 import subprocess
 import tempfile
 from contextlib import ExitStack
@@ -15,12 +9,10 @@ from pathlib import Path
 import pytest
 from running import BIN, CLIP, POINTED_AT, ROOT, SITE, command, process, tail, wait_until
 from site_made import add, make_site
+from stock_zenohd import WHY_NO_ZENOHD, ZENOHD
 from two_hosts import TwoHosts, assert_each_frame_crosses_once, missing_for_two_hosts
 
-ZENOHD = os.environ.get("DEIXIS_ZENOHD") or shutil.which("zenohd")
-WHY_NOT = missing_for_two_hosts() or (
-    "" if ZENOHD else "there is no zenohd: build it (docs/deployment.md) or name it in DEIXIS_ZENOHD"
-)
+WHY_NOT = missing_for_two_hosts() or WHY_NO_ZENOHD
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
 
 PATIENCE_S = 90.0

@@ -1,7 +1,5 @@
 """A stock zenohd with the settings that `deixis certs zenohd` writes: mutual TLS and the roles, as our router has them."""
 
-import os
-import shutil
 from contextlib import ExitStack
 
 import pytest
@@ -11,8 +9,8 @@ from deixis_runtime.session import Unreachable, client_config, open_client
 from parties import PATIENCE_S, Party, until_heard
 from running import ROOT, answers, free_port, process, wait_until
 from site_made import add, holder, make_site
+from stock_zenohd import WHY_NO_ZENOHD, ZENOHD
 
-ZENOHD = os.environ.get("DEIXIS_ZENOHD") or shutil.which("zenohd")
 FRAME, TARGET = "deixis/r1/camera/frame", "deixis/r1/fusion/target"
 
 
@@ -42,7 +40,7 @@ def test_a_folder_without_a_list_makes_no_settings(settings, capsys):
     assert "a router needs the list of those who may link" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(ZENOHD is None, reason="there is no zenohd: build it (docs/deployment.md) or name it in DEIXIS_ZENOHD")
+@pytest.mark.skipif(ZENOHD is None, reason=WHY_NO_ZENOHD)
 def test_zenohd_keeps_to_the_roles(settings, tmp_path):
     members, file = settings
     endpoint, inside = f"tls/127.0.0.1:{free_port()}", f"unixsock-stream/{tmp_path}/socket"

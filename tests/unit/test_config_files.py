@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 
 import pytest
@@ -11,6 +10,7 @@ from deixis_runtime.router import router_config
 from deixis_runtime.site import load_site
 from deixis_runtime.two_links import two_links
 from running import ROOT
+from stock_zenohd import WHY_NO_ZENOHD, ZENOHD
 
 SETTINGS = sorted((ROOT / "config").glob("*.json5"))
 SITES = sorted((ROOT / "config" / "sites").glob("*.yaml"))
@@ -29,10 +29,10 @@ def test_our_router_takes_the_settings_and_the_endpoints_of_the_command_line(pat
     assert json.loads(config.get_json("connect/endpoints")) == endpoints
 
 
-@pytest.mark.skipif(shutil.which("zenohd") is None, reason="there is no zenohd here")
+@pytest.mark.skipif(ZENOHD is None, reason=WHY_NO_ZENOHD)
 @pytest.mark.parametrize("path", SETTINGS, ids=lambda path: path.name)
 def test_zenohd_takes_the_settings(path, free_port):
-    argv = ["zenohd", "-c", path, "-l", f"tcp/127.0.0.1:{free_port}"]
+    argv = [ZENOHD, "-c", path, "-l", f"tcp/127.0.0.1:{free_port}"]
     with pytest.raises(subprocess.TimeoutExpired):  # it goes on running
         subprocess.run(argv, check=True, timeout=2)
 
