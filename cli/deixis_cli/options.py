@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 from pathlib import Path
 
 from deixis_runtime.certificates import add_certificates, certificates_of
@@ -40,6 +41,17 @@ def add_connect(parser: argparse.ArgumentParser) -> None:
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
     """--json."""
     parser.add_argument("--json", action="store_true", help=what)
+
+
+def seconds(text: str) -> float:
+    """A time to wait, for argparse. Raises ArgumentTypeError for what is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds above 0")
+    return value
 
 
 def add_host(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from . import wording
 from .live_view import view_for
-from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site
+from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site, seconds
 from .play import PlayResult, play
 from .source import Source, read_source
 
@@ -36,7 +36,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--loop", action="store_true", help="play a file again and again")
     add_out(parser)
     parser.add_argument("--expect", metavar="POI_ID", help="succeed only if the single final answer is exactly this POI")
-    parser.add_argument("--timeout", type=float, metavar="SECONDS", help="give up when the source has not ended by then")
+    parser.add_argument("--timeout", type=seconds, metavar="SECONDS", help="give up when the source has not ended by then")
     add_json(parser, "print one JSON document at the end, and nothing before")
     parser.set_defaults(run=run)
 
@@ -56,6 +56,8 @@ def out_options(given: argparse.Namespace, name: str) -> dict[str, Any]:
     if given.out is None and given.pictures:
         raise CommandError("--pictures goes with --out")
     mcap = None if given.out is None else given.out / f"{name}.mcap"
+    if mcap is not None and mcap.exists():  # before NAME.jsonl beside it is begun anew
+        raise CommandError(f"'{mcap}' exists already, and a recording is never written over; give another --out")
     return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import socket
+import sys
 import time
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import Any, NoReturn
 
 import zenoh
 from deixis_cli.mcap_file import McapFileError
@@ -51,7 +54,7 @@ def register(subparsers: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Check the stage. 1 when it breaks the contract. Raises CommandError, or Unreachable without a router."""
+    """Check the stage. 1 when it breaks the contract. Raises CommandError, Unreachable, and SystemExit on SIGTERM."""
     if (given.start is None) == (given.robot is None):
         raise CommandError("give --command to start the stage, or --robot (and --connect) of one that runs")
     began_s = time.monotonic()
@@ -75,6 +78,7 @@ def run(given: argparse.Namespace) -> int:
 
 def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
     with ExitStack() as stack:
+        stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, _leave))
         if given.start is None:
             session = stack.enter_context(open_client(given.connect, shared_memory=False))
             exam = Examination(session, given.robot, given.stage, recording, lambda: True)
@@ -88,6 +92,11 @@ def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
         exam.listen()
         stack.enter_context(subject)
         return examine_started(exam, subject, recording)
+
+
+def _leave(number: int, _frame: FrameType | None) -> NoReturn:
+    """On the way out the stage that we have started is ended, which otherwise would stay."""
+    sys.exit(128 + number)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from deixis_schemas.topics import Topic
 
 from .garbage import garbage_for
 from .observation import Fed, Heard, Phase
-from .recording import Moment, Recording, raw_frame, renamed
+from .recording import Moment, Recording, jpeg_frame, raw_frame, renamed
 
 WE = "check"
 SETTLE_S = 0.5
@@ -155,8 +155,8 @@ class Examination:
             message = moment.messages.get(topic)
             if message is None or topic is without:
                 continue
-            if isinstance(message, Frame) and not as_jpeg:
-                message = raw_frame(message)
+            if isinstance(message, Frame):
+                message = jpeg_frame(message) if as_jpeg else raw_frame(message)
             named = renamed(message, frame_id, stamp_ns)
             self._put(topic, named.model_copy(update={"instance": WE}))
         return Fed(frame_id, stamp_ns, time.monotonic())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,8 @@ from rich.text import Text
 
 from .results import Result
 
+# What XML 1.0 has no way to write, e.g. the colours in what a stage prints.
+NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 MARKS = {"passed": ("ok   ", "green"), "failed": ("WRONG", "red"), "noted": ("note ", "yellow"), "skipped": ("skip ", "cyan")}
 
 
@@ -51,12 +54,13 @@ def write_junit(path: Path, stage: str, results: Sequence[Result], seconds: floa
         time=f"{seconds:.3f}",
     )
     for result in results:
+        said = NO_XML.sub("", result.found)
         case = ElementTree.SubElement(suite, "testcase", classname=f"deixis.{stage}", name=result.name)
         if result.outcome == "failed":
-            ElementTree.SubElement(case, "failure", message=result.found).text = result.advice
+            ElementTree.SubElement(case, "failure", message=said).text = result.advice
         elif result.outcome == "skipped":
-            ElementTree.SubElement(case, "skipped", message=result.found)
+            ElementTree.SubElement(case, "skipped", message=said)
         else:
-            ElementTree.SubElement(case, "system-out").text = result.found
+            ElementTree.SubElement(case, "system-out").text = said
     ElementTree.indent(suite)
     path.write_bytes(ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True))

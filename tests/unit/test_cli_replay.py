@@ -145,6 +145,15 @@ def test_what_cannot_be_played_is_refused_with_what_to_do(tmp_path, arguments, t
         run(given_(path, *arguments))
 
 
+def test_a_recording_is_not_replayed_into_itself_and_what_lies_beside_it_stays(tmp_path):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
+    (tmp_path / "a.jsonl").write_text("what was said")
+    with pytest.raises(CommandError, match=r"a\.mcap' exists already.*give another --out"):
+        run(given_(path, "--out", tmp_path))
+    assert stages_in(path) == {"camera"}
+    assert (tmp_path / "a.jsonl").read_text() == "what was said"
+
+
 def test_a_missing_recording_is_named():
     with pytest.raises(CommandError, match=r"none\.mcap"):
         run(given_("none.mcap"))
