@@ -27,6 +27,7 @@ from .restamp import Restamper
 log = logging.getLogger("deixis-replay")
 
 ANSWER_TIMEOUT_S = 10.0
+MOST_UNANSWERED = 3
 STOP_S = 5.0
 # What is not said by a stage that is replaced, but is the place that all of it happened in.
 CONTEXT = (topics.CAMERA_INFO, topics.ROBOT_POSE)
@@ -44,6 +45,7 @@ class Replayer:
         """`replayed` are the stages spoken for, `running` those that listen. `pois`: edit the registry as recorded."""
         self.failure = ""
         self.unanswered = 0
+        self._unanswered_in_a_row = 0
         self.frames = 0
         self._path = path
         self._robot = robot
@@ -56,6 +58,7 @@ class Replayer:
         self._stop = threading.Event()
         self._answers = Inbox()
         self._answered: dict[str, FrameId] = {}
+        self._missing: list[str] = []
         self._publishers: dict[str, Publisher] = {}
         self._camera: CameraInfo | None = None
         self._last: OfFrame | None = None
@@ -106,6 +109,9 @@ class Replayer:
                 if self._stop.is_set():
                     return
                 self._feed(group)
+                if self._unanswered_in_a_row == MOST_UNANSWERED:
+                    self.failure = f"{MOST_UNANSWERED} frames in a row were not answered on {', '.join(self._missing)}"
+                    return
         else:
             self._play_at_own_rate(lines, instance)
         if reader.cut:
@@ -134,17 +140,20 @@ class Replayer:
         if frame_id is None or not self._answerable <= {line.topic for line in group}:
             return
         until_s = time.monotonic() + ANSWER_TIMEOUT_S
-        while not self._has_answers(frame_id) and not self._stop.is_set():
+        while self._without_answer(frame_id) and not self._stop.is_set():
             if time.monotonic() > until_s:
                 self.unanswered += 1
+                self._unanswered_in_a_row += 1
+                self._missing = self._without_answer(frame_id)
                 return
             self._answers.wait(0.1)
             for received in self._answers.take_all():
                 if isinstance(received.message, OfFrame):
                     self._answered[received.topic.path] = received.message.frame_id
+        self._unanswered_in_a_row = 0
 
-    def _has_answers(self, frame_id: FrameId) -> bool:
-        return all(self._answered.get(topic.path) == frame_id for topic in self._answering)
+    def _without_answer(self, frame_id: FrameId) -> list[str]:
+        return [topic.path for topic in self._answering if self._answered.get(topic.path) != frame_id]
 
     def _say(self, line: Line, message: Message | None) -> None:
         key = _key_of(self._robot, line.key)

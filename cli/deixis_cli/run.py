@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from deixis_runtime.host import SOURCE, HostFailed, HostOptions
+from deixis_schemas import topics
 from rich.console import Console
 
 from . import wording
@@ -112,7 +113,12 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
     rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
     console.out(f"{played}{rejected}.", highlight=False)
     share = counts.get("Belief", 0) / result.frames
-    if share < ENOUGH_ANSWERED:
+    fusion = result.health.get(topics.BELIEF.stage)
+    if not share and fusion is not None:
+        console.out(
+            f"No frame was answered; fusion is {fusion.state}: {fusion.reason or 'it gives no reason'}", highlight=False
+        )
+    elif 0 < share < ENOUGH_ANSWERED:
         console.out(
             f"Only {share:.0%} of the frames were answered: this machine is too slow or too busy for the source's rate. "
             "Free it, lower the rate (--set camera.rate_hz=15), or play recordings with --lockstep.",
