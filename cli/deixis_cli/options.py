@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from deixis_runtime.certificates import add_certificates, certificates_of
+from deixis_runtime.endpoint import NotAnEndpoint, read_endpoint
 from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
 from deixis_runtime.link_security import LinkSecurity
 from deixis_runtime.session import DEFAULT_ENDPOINT
@@ -105,6 +106,11 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
             raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
     site = given.site.resolve() if given.site is not None else None
     listen = tuple(given.listen or (DEFAULT_ENDPOINT,))
+    for endpoint in listen:
+        try:
+            read_endpoint(endpoint, least_port=0)
+        except NotAnEndpoint as error:
+            raise CommandError(f"--listen: {error}") from None
     security = LinkSecurity(certificates_of(), insecure=given.insecure, frames_stay=given.frames_stay)
     return HostOptions(
         robot=given.robot,

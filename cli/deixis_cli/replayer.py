@@ -62,6 +62,8 @@ class Replayer:
         self._publishers: dict[str, Publisher] = {}
         self._camera: CameraInfo | None = None
         self._last: OfFrame | None = None
+        # Until we are left, also past the end: a stage that is gone counts for nothing in answers that are still to come.
+        self._declared: list[Any] = []
         self._session: zenoh.Session
         self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
 
@@ -77,6 +79,7 @@ class Replayer:
     def __exit__(self, *_: object) -> None:
         self._stop.set()
         self._thread.join(STOP_S)
+        self._declared.clear()
 
     def is_over(self) -> bool:
         """Whether all has been said."""
@@ -85,12 +88,10 @@ class Replayer:
     # --- in the thread ------------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        declared: list[Any] = [
-            self._session.declare_subscriber(t.key(self._robot), self._answers.store) for t in self._answering
-        ]
+        self._declared += [self._session.declare_subscriber(t.key(self._robot), self._answers.store) for t in self._answering]
         instance = f"replay-{os.getpid()}"
         tokens = [topics.alive_key(self._robot, stage, instance) for stage in sorted(self._replayed)]
-        declared += [self._session.liveliness().declare_token(token) for token in tokens]
+        self._declared += [self._session.liveliness().declare_token(token) for token in tokens]
         try:
             self._play(instance)
         except McapFileError as error:
@@ -99,7 +100,6 @@ class Replayer:
             self.failure = f"Zenoh: {first_line(error)}"
         finally:
             self._say_ended()
-            del declared
 
     def _play(self, instance: str) -> None:
         reader = McapReader(self._path)

@@ -114,10 +114,8 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
     console.out(f"{played}{rejected}.", highlight=False)
     share = counts.get("Belief", 0) / result.frames
     fusion = result.health.get(topics.BELIEF.stage)
-    if not share and fusion is not None:
-        console.out(
-            f"No frame was answered; fusion is {fusion.state}: {fusion.reason or 'it gives no reason'}", highlight=False
-        )
+    if not share and fusion is not None and fusion.reason:
+        console.out(f"No frame was answered; fusion is {fusion.state}: {fusion.reason}", highlight=False)
     elif 0 < share < ENOUGH_ANSWERED:
         console.out(
             f"Only {share:.0%} of the frames were answered: this machine is too slow or too busy for the source's rate. "

@@ -12,6 +12,7 @@ from deixis_cli.raw_message import RawMessage
 from deixis_cli.replay import register, run, stages_in
 from deixis_cli.restamp import Restamper
 from deixis_conformance.command import own_router
+from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, FrameId, OfFrame
 from deixis_schemas.samples import FRAME, SAMPLES
@@ -176,6 +177,21 @@ def test_a_replay_in_lockstep_does_not_wait_for_ever_for_stages_that_answer_noth
         wait_until(playing.is_over, "its end", 10)
     assert playing.failure == "3 frames in a row were not answered on tracker/tracks"
     assert playing.frames == 3
+
+
+def test_the_stages_spoken_for_are_alive_until_the_last_answer_is_heard(tmp_path):
+    playing = replayer.Replayer(
+        recorded(tmp_path / "a.mcap", "Tracks"), "r1", {"tracker"}, {"gesture"}, lockstep=False, pois=False
+    )
+    with own_router() as (endpoint, session), open_client(endpoint, shared_memory=False) as other:
+
+        def alive():
+            return [reply.ok for reply in other.liveliness().get("deixis/r1/@alive/tracker/*", timeout=1.0)]
+
+        with playing.on(session):
+            wait_until(playing.is_over, "its end", 10)
+            assert alive()
+        wait_until(lambda: not alive(), "the end of its tokens", 5)
 
 
 def test_a_missing_recording_is_named():
