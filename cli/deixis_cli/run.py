@@ -104,15 +104,17 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
     """The final answers, and how the run fared, as text; nothing for a source that gave no frame."""
     for target in result.targets:
         console.out(f"\n{wording.answer_text(target, names)}", highlight=False)
-    if not result.frames:
+    counts = result.counters
+    answered = counts.get("Belief", 0)
+    if not (result.frames or answered):
         return
     if not result.targets:
         console.out("\nNobody was seen pointing.", highlight=False)
-    counts = result.counters
-    played = f"\n{result.frames} frames in {result.wall_s:.1f} s, {counts.get('Belief', 0)} answered"
+    # A recording may speak for the stages behind the camera alone: then nobody sends frames, and they are answered all the same.
+    played = f"\n{result.frames or answered} frames in {result.wall_s:.1f} s, {answered} answered"
     rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
     console.out(f"{played}{rejected}.", highlight=False)
-    share = counts.get("Belief", 0) / result.frames
+    share = answered / (result.frames or answered)
     fusion = result.health.get(topics.BELIEF.stage)
     if not share and fusion is not None and fusion.reason:
         console.out(f"No frame was answered; fusion is {fusion.state}: {fusion.reason}", highlight=False)

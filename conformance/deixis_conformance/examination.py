@@ -13,7 +13,7 @@ import zenoh
 from deixis_cli.gets import Refusal, get_all
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, Frame, FrameId, Health, Message, OfFrame, Produced
-from deixis_schemas.topics import Topic
+from deixis_schemas.topics import Delivery, Topic
 
 from .garbage import garbage_for
 from .observation import Fed, Heard, Phase
@@ -46,10 +46,13 @@ class Examination:
         self._stamp_ns = time.time_ns()
         self._inputs = topics.INPUTS[stage]
 
-    def listen(self) -> None:
-        """Hear all of the robot from now on; what we say ourselves is not among it."""
-        key = f"deixis/{self.robot}/**"
-        self._declared.append(self._session.declare_subscriber(key, self._store))
+    def listen(self, *, all_keys: bool) -> None:
+        """Hear the robot from now on; what we say ourselves is not among it.
+
+        Without `all_keys` by keys that access control gives to all roles: of one that takes in frames, nothing would come.
+        """
+        for key in [f"deixis/{self.robot}/**"] if all_keys else watched_keys(self.robot, self.stage):
+            self._declared.append(self._session.declare_subscriber(key, self._store))
 
     def speak(self) -> None:
         """Stand in for the stages that are listened to, and the camera: they are alive, their lens and place are known."""
@@ -202,6 +205,15 @@ class Examination:
 
 MAX_ONCE = 32
 REMOTE = zenoh.Locality.REMOTE
+
+
+def watched_keys(robot: str, stage: str) -> list[str]:
+    """What is heard beside a stage that runs: all of the stage, and of the others all but frames that it does not live on."""
+    others = [topic for topic in topics.TOPICS if topic.delivery is not Delivery.REPLY and topic is not topics.HEALTH]
+    wanted = [topic for topic in others if topic.stage != stage]
+    if topics.TRACKS.stage != stage:
+        wanted = [topic for topic in wanted if topic is not topics.FRAME]
+    return [f"deixis/{robot}/{stage}/**", *(topic.key(robot, id="*") for topic in wanted)]
 
 
 def _with_picture(moment: Moment, *, as_jpeg: bool) -> Moment:

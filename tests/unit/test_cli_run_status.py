@@ -77,6 +77,13 @@ def test_where_frames_go_unanswered_it_is_said_whose_fault_it_is(answered, fusio
     assert unsaid not in text
 
 
+def test_a_recording_without_frames_is_told_of_as_well():
+    console = Console(record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    print_answers(console, PlayResult(frames=0, counters={"Belief": 9}), NAMES)
+    assert "Nobody was seen pointing." in (text := console.export_text())
+    assert "9 frames in 0.0 s, 9 answered." in text
+
+
 def test_the_json_document_can_be_read_and_holds_the_answers():
     result = PlayResult(frames=9, targets=[TARGET], camera=CAMERA, counters={"Frame": 9}, wall_s=1.23456)
     read = json.loads(json.dumps(document("r1", "rtsp://user:secret@host/", result)))

@@ -1,8 +1,10 @@
 """What the checks of a stage make of what was fed and heard."""
 
+from itertools import combinations
 from xml.etree import ElementTree
 
 import pytest
+import zenoh
 from deixis_cli.mcap_file import McapRecorder
 from deixis_cli.raw_message import RawMessage
 from deixis_conformance.answer_checks import (
@@ -16,12 +18,13 @@ from deixis_conformance.answer_checks import (
     fed_of,
 )
 from deixis_conformance.camera_checks import check_camera
+from deixis_conformance.examination import watched_keys
 from deixis_conformance.garbage import garbage_for
 from deixis_conformance.health_checks import check_health, check_says_rejected
 from deixis_conformance.observation import Fed, Heard, Phase
 from deixis_conformance.payload_checks import check_payloads, check_producer
 from deixis_conformance.recording import SHIPPED, RecordingError, jpeg_frame, raw_frame, read_recording
-from deixis_conformance.report import write_junit
+from deixis_conformance.report import print_report, unseen, write_junit
 from deixis_conformance.results import Result
 from deixis_schemas import Producer, codec, topics
 from deixis_schemas.messages import FrameId, Gestures, InputHealth
@@ -291,3 +294,28 @@ def test_junit_that_cannot_be_written_is_an_error(tmp_path):
 def test_junit_is_xml_whatever_a_stage_has_printed(tmp_path):
     write_junit(tmp_path / "a.xml", "gesture", [Result("starts", "failed", "its log: \x1b[31mno\0 model\ud800 é", "b")], 1.0)
     assert ElementTree.parse(tmp_path / "a.xml").find("testcase/failure").get("message") == "its log: [31mno model é"
+
+
+# --- a stage that runs already ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stage", topics.STAGES)
+def test_beside_a_running_stage_no_key_is_heard_twice_and_frames_only_by_whom_they_concern(stage):
+    keys = [zenoh.KeyExpr(key) for key in watched_keys("r1", stage)]
+    assert not [pair for pair in combinations(keys, 2) if pair[0].intersects(pair[1])]
+
+    def hears(topic):
+        return any(key.intersects(zenoh.KeyExpr(topic.key("r1", id="*", stage=stage))) for key in keys)
+
+    # A subscription that takes in frames is denied whole to viewers and robots.
+    assert hears(topics.FRAME) == (stage in ("camera", "tracker"))
+    assert all(hears(topic) for topic in topics.INPUTS[stage] if topic is not topics.FRAME)
+    assert hears(topics.HEALTH)
+
+
+@pytest.mark.parametrize(("outcome", "verdict"), [("skipped", "was not seen at work"), ("passed", "keeps the contract")])
+def test_a_stage_that_was_not_seen_at_work_is_not_said_to_keep_the_contract(outcome, verdict, capsys):
+    results = [Result("liveliness", "passed", "its token stands"), Result("answers", outcome, "nothing came", "")]
+    print_report("gesture", results, 1.0)
+    assert f"gesture: {verdict} (" in capsys.readouterr().out
+    assert unseen(results) == (outcome == "skipped")
