@@ -110,7 +110,7 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
         return
     if not result.targets:
         console.out("\nNobody was seen pointing.", highlight=False)
-    # A recording may speak for the stages behind the camera alone: then nobody sends frames, and they are answered all the same.
+    # A recording may speak for the stages behind the camera alone: then nobody sends frames, and they are answered.
     played = f"\n{result.frames or answered} frames in {result.wall_s:.1f} s, {answered} answered"
     rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
     console.out(f"{played}{rejected}.", highlight=False)
