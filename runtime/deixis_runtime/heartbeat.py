@@ -56,6 +56,10 @@ class Heartbeat:
         """Seconds until the next record is due."""
         return max(0.0, self._next_s - time.monotonic())
 
+    def hasten(self, within_s: float) -> None:
+        """Let the next record be due by then, if it is not due before."""
+        self._next_s = min(self._next_s, time.monotonic() + within_s)
+
     def step_took(self, seconds: float) -> None:
         """Note the time of one step."""
         self._steps.add(seconds, time.monotonic())

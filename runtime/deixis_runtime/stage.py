@@ -44,6 +44,8 @@ IDLE_WAIT_S = 0.25
 # A signal handler may set a plain attribute only (`threading.Event.set` can deadlock in one): `wait` looks this often.
 STOP_POLL_S = 0.1
 ANSWERING_S = 0.01
+# Who looks on through a new router hears of us when it has its subscriptions, too, and not a whole period later.
+LINK_SETTLES_S = 0.25
 MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 
 
@@ -66,6 +68,7 @@ class Node:
         self._event = threading.Event()
         self._limit = RateLimit()
         self._logged_state: HealthState = "ok"
+        self._linked_to = ""
         self._heartbeat = Heartbeat(self.producer)
         self._patient_puts = PatientPuts(self._go_on) if options.lockstep else None
         self._inputs: list[Subscription] = []
@@ -161,6 +164,7 @@ class Node:
         """Wait for input, at most `timeout_s` and often less; answer gets and send the heartbeat. False: stop the stage."""
         if self._token is None:
             self._declare_alive()
+        self._look_at_link()
         self._event.wait(min(timeout_s, self._heartbeat.due_in_s(), STOP_POLL_S))
         self._event.clear()
         # A flood of gets takes this much of each turn, and the stage's own work the rest.
@@ -248,6 +252,12 @@ class Node:
         self._health.put(self._record())
         if not self._router():
             self.warn("router", f"no link to the Zenoh router at {self._endpoint}; trying again")
+
+    def _look_at_link(self) -> None:
+        router = self._router()
+        if router and router != self._linked_to:
+            self._heartbeat.hasten(LINK_SETTLES_S)
+        self._linked_to = router
 
     def _go_on(self) -> bool:
         """Give a sign that the loop runs, and say whether it is to go on."""

@@ -133,6 +133,11 @@ def runs(pid):
         return False
 
 
+def stands(pid):
+    """Whether all threads of a process are stopped."""
+    return all(path.read_text().rpartition(")")[2].split()[0] == "T" for path in Path(f"/proc/{pid}/task").glob("*/stat"))
+
+
 @pytest.mark.parametrize("stage", topics.STAGES)
 def test_a_stage_killed_in_a_stroke_is_started_again_and_the_answer_still_comes(up, stage):
     before = up.pids()
@@ -241,6 +246,8 @@ def test_a_killed_supervisor_leaves_no_process_and_nothing_else_though_a_stage_a
     live.child.send_signal(signal.SIGSTOP)  # or it would find them
     os.kill(now["headpose"], signal.SIGSTOP)
     os.kill(now[ROUTER], signal.SIGSTOP)
+    # The kernel continues those that stand when their parent ends; a signal sent just before may still be on its way.
+    live.wait(lambda: stands(now["headpose"]) and stands(now[ROUTER]), "both stand")
     live.child.kill()
     wait_until(lambda: not any(map(runs, pids)), "all children are gone", 5, live.log)
     assert live.place.shared_memory() == set()
