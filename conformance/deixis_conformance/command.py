@@ -56,7 +56,7 @@ def register(subparsers: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Check the stage. 1 when it breaks the contract or says nothing. Raises CommandError, Unreachable, SystemExit (SIGTERM)."""
+    """Check the stage. 1 when it breaks the contract or says nothing. Raises CommandError, Unreachable, SystemExit."""
     if (given.start is None) == (given.robot is None):
         raise CommandError("give --command to start the stage, or --robot (and --connect) of one that runs")
     began_s = time.monotonic()
