@@ -28,6 +28,7 @@ log = logging.getLogger("deixis-replay")
 
 ANSWER_TIMEOUT_S = 10.0
 MOST_UNANSWERED = 3
+TELL_OF_HOLE_S = 3.0
 STOP_S = 5.0
 # What is not said by a stage that is replaced, but is the place that all of it happened in.
 CONTEXT = (topics.CAMERA_INFO, topics.ROBOT_POSE)
@@ -122,7 +123,10 @@ class Replayer:
         restamper: Restamper | None = None
         for line in lines:
             after_s = pace.after_s(line)
-            if self._stop.wait(max(0.0, began_s + after_s - time.monotonic())):
+            wait_s = began_s + after_s - time.monotonic()
+            if wait_s > TELL_OF_HOLE_S:
+                log.warning("'%s' has a hole: nothing is said for %.0f s (--lockstep does not wait)", self._path, wait_s)
+            if self._stop.wait(max(0.0, wait_s)):
                 return
             message = line.message
             if restamper is None and isinstance(message, OfFrame | CameraInfo):

@@ -179,6 +179,19 @@ def test_a_replay_in_lockstep_does_not_wait_for_ever_for_stages_that_answer_noth
     assert playing.frames == 3
 
 
+def test_a_hole_in_a_recording_is_told_of_and_its_end_is_not_waited_for_when_told_to_stop(tmp_path, caplog):
+    path = tmp_path / "a.mcap"
+    with McapRecorder(path) as recorder:
+        for at_s in (0, 3600):
+            label = codec.encoding_of(type(FRAME))
+            recorder.write(RawMessage("deixis/r1/camera/frame", label, codec.encode(FRAME), at_s * 10**9))
+    playing = replayer.Replayer(path, "r1", {"camera"}, {"tracker"}, lockstep=False, pois=False)
+    with own_router() as (_, session), playing.on(session):
+        wait_until(lambda: "nothing is said for 3600 s" in caplog.text, "a word", 10)
+    assert playing.is_over()
+    assert playing.frames == 1
+
+
 def test_the_stages_spoken_for_are_alive_until_the_last_answer_is_heard(tmp_path):
     playing = replayer.Replayer(
         recorded(tmp_path / "a.mcap", "Tracks"), "r1", {"tracker"}, {"gesture"}, lockstep=False, pois=False
