@@ -42,7 +42,8 @@ def main() -> int:
         ]
         run += ["--out", folder, "--pictures", "--set", "camera.encoding=jpeg", "--set", f"camera.quality={QUALITY}"]
         subprocess.run([*map(str, run), "--listen", "tcp/127.0.0.1:0"], check=True)
-        with McapRecorder(ROOT / "conformance" / "deixis_conformance" / f"{CLIP}.mcap") as recorder:
+        (kept := ROOT / "conformance" / "deixis_conformance" / f"{CLIP}.mcap").unlink(missing_ok=True)
+        with McapRecorder(kept) as recorder:
             for message in McapReader(folder / f"{CLIP}.mcap"):
                 if topics.topic_of(message.key) in KEPT:
                     recorder.write(_of_no_machine(message))

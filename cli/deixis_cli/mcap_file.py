@@ -42,17 +42,19 @@ class McapRecorder:
     """Writes a recording. Use as a context manager: what is missing at the end of a file makes it slow to open elsewhere."""
 
     def __init__(self, path: Path) -> None:
-        """Raises McapFileError where the file cannot be made."""
+        """Raises McapFileError where the file is there already or cannot be made."""
         self.path = path
         self.messages = 0
         self._channels: dict[tuple[str, str, bool], int] = {}
         self._schemas: dict[str, int] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: IO[bytes] = path.open("wb")
+            self._file: IO[bytes] = path.open("xb")
             # lz4: pictures hardly become smaller, and it takes the least time with them.
             self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
             self._writer.start(profile="", library="deixis")
+        except FileExistsError:
+            raise McapFileError(f"'{path}' exists already; a recording is never written over") from None
         except OSError as error:
             raise _failed(path, error) from None
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 from pathlib import Path
 
 from deixis_runtime.certificates import add_certificates, certificates_of
+from deixis_runtime.endpoint import NotAnEndpoint, read_endpoint
 from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
 from deixis_runtime.link_security import LinkSecurity
 from deixis_runtime.session import DEFAULT_ENDPOINT
@@ -40,6 +42,17 @@ def add_connect(parser: argparse.ArgumentParser) -> None:
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
     """--json."""
     parser.add_argument("--json", action="store_true", help=what)
+
+
+def seconds(text: str) -> float:
+    """A time to wait, for argparse. Raises ArgumentTypeError for what is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds above 0")
+    return value
 
 
 def add_host(parser: argparse.ArgumentParser) -> None:
@@ -93,6 +106,11 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
             raise CommandError(f"a setting is given for stage '{stage}', which is not started here")
     site = given.site.resolve() if given.site is not None else None
     listen = tuple(given.listen or (DEFAULT_ENDPOINT,))
+    for endpoint in listen:
+        try:
+            read_endpoint(endpoint, least_port=0)
+        except NotAnEndpoint as error:
+            raise CommandError(f"--listen: {error}") from None
     security = LinkSecurity(certificates_of(), insecure=given.insecure, frames_stay=given.frames_stay)
     return HostOptions(
         robot=given.robot,

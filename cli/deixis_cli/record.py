@@ -21,11 +21,12 @@ from rich.status import Status
 from .gets import get_raw
 from .inbox import Inbox
 from .mcap_file import McapFileError, McapRecorder
-from .options import CommandError, add_connect, add_robot
+from .options import CommandError, add_connect, add_robot, seconds
 from .raw_message import RawMessage
 
 TURN_S = 0.1
 SILENT_S = 3.0
+NO_FRAMES = "no frames were heard: the camera sends none, or access control keeps them from us"
 # What was said once, before we listened: the lens, and the points of interest.
 ASKED = (topics.CAMERA_INFO, topics.POI)
 
@@ -37,7 +38,7 @@ def register(subparsers: Any) -> None:
     add_robot(parser)
     add_connect(parser)
     parser.add_argument("--no-pictures", action="store_true", help="leave out the frames: small, and shows nobody")
-    parser.add_argument("--seconds", type=float, metavar="N", help="stop after so long (default: on Ctrl-C)")
+    parser.add_argument("--seconds", type=seconds, metavar="N", help="stop after so long (default: on Ctrl-C)")
     parser.set_defaults(run=run)
 
 
@@ -58,7 +59,7 @@ def run(given: argparse.Namespace) -> int:
             stack.callback(session.declare_subscriber(key, inbox.store).undeclare)
         try:
             with McapRecorder(given.file) as recorder, console.status("recording") as status:
-                heard = Recording(given.robot, given.connect, recorder, inbox, status)
+                heard = Recording(given.robot, given.connect, recorder, inbox, status, pictures=not given.no_pictures)
                 heard.record(session, interrupts, until_s)
         except McapFileError as error:
             raise CommandError(str(error)) from None
@@ -79,13 +80,17 @@ def recorded_keys(robot: str, *, pictures: bool) -> list[str]:
 class Recording:
     """Takes what comes from the inbox to the file, and counts it by topic."""
 
-    def __init__(self, robot: str, endpoint: str, recorder: McapRecorder, inbox: Inbox, status: Status) -> None:
+    def __init__(
+        self, robot: str, endpoint: str, recorder: McapRecorder, inbox: Inbox, status: Status, *, pictures: bool
+    ) -> None:
+        """`pictures`: whether frames are to be heard."""
         self.counts: Counter[str] = Counter()
         self._robot = robot
         self._endpoint = endpoint
         self._recorder = recorder
         self._inbox = inbox
         self._status = status
+        self._pictures = pictures
         self._began_s = time.monotonic()
         self._bytes = 0
         self._told_silent = False
@@ -107,7 +112,8 @@ class Recording:
             return f"deixis record: nothing was heard of robot '{self._robot}' at {self._endpoint}; see 'deixis status'"
         parts = ", ".join(f"{path} {count}" for path, count in sorted(self.counts.items()))
         lost = f"; {self._inbox.lost} messages lost: this machine or the disk is too slow" if self._inbox.lost else ""
-        return f"{self._recorder.path}: {self._size()} in {time.monotonic() - self._began_s:.1f} s ({parts}){lost}"
+        blind = "" if self.counts[topics.FRAME.path] or not self._pictures else f"; {NO_FRAMES}"
+        return f"{self._recorder.path}: {self._size()} in {time.monotonic() - self._began_s:.1f} s ({parts}){lost}{blind}"
 
     def _keep(self, message: RawMessage) -> None:
         self._recorder.write(message)

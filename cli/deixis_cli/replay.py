@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,8 @@ from .replayer import Replayer
 from .run import add_out, document, exit_status, out_options, print_answers
 
 DEFAULT_AS = topics.FRAME.stage
-# What these work on is pictures.
-LOOK_AT_FRAMES = (topics.TRACKS.stage, topics.HEAD_POSES.stage)
+# Without one of these a stage has nothing to answer, or to say where: a replay in lockstep would wait in vain for each frame.
+NEEDED = {topics.FRAME: "pictures", topics.TRACKS: "tracks"}
 KEEPER = topics.POI.stage
 
 
@@ -82,12 +83,7 @@ def _prepare(given: argparse.Namespace) -> tuple[HostOptions, Replayer, dict[str
     given.without = [*given.without, *spoken_for, SOURCE]
     site = read_site(given.site)
     options = host_options(given, lockstep=given.lockstep)
-    blind = [name for name in LOOK_AT_FRAMES if name in options.stages]
-    if blind and SOURCE not in spoken_for:
-        raise CommandError(
-            f"{' and '.join(blind)} would run without pictures: "
-            f"give --as {SOURCE},{given.spoken_for}, or --except {','.join(blind)}"
-        )
+    _check_fed(options.stages, spoken_for)
     replayer = Replayer(
         given.file, given.robot, spoken_for, options.stages, lockstep=given.lockstep, pois=site is None or KEEPER in spoken_for
     )
@@ -98,6 +94,19 @@ def stages_in(path: Path) -> set[str]:
     """Stages whose answers to frames, or frames, the recording holds. Raises McapFileError."""
     found = {topics.topic_of(key) for key in keys_in(path)}
     return {topic.stage for topic in found if topic is not None and topic.by is By.FRAME}
+
+
+def _check_fed(running: Sequence[str], spoken_for: Sequence[str]) -> None:
+    """Raises CommandError where a stage would run without what it works on."""
+    for topic, what in NEEDED.items():
+        if topic.stage in (*running, *spoken_for):
+            continue
+        deprived = [name for name in running if topic in topics.INPUTS.get(name, ())]
+        if deprived:
+            also = ",".join((topic.stage, *spoken_for))
+            raise CommandError(
+                f"{' and '.join(deprived)} would run without {what}: give --as {also}, or --except {','.join(deprived)}"
+            )
 
 
 def _unanswered(replayer: Replayer) -> str | None:

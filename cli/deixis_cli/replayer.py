@@ -27,6 +27,8 @@ from .restamp import Restamper
 log = logging.getLogger("deixis-replay")
 
 ANSWER_TIMEOUT_S = 10.0
+MOST_UNANSWERED = 3
+TELL_OF_HOLE_S = 3.0
 STOP_S = 5.0
 # What is not said by a stage that is replaced, but is the place that all of it happened in.
 CONTEXT = (topics.CAMERA_INFO, topics.ROBOT_POSE)
@@ -44,6 +46,7 @@ class Replayer:
         """`replayed` are the stages spoken for, `running` those that listen. `pois`: edit the registry as recorded."""
         self.failure = ""
         self.unanswered = 0
+        self._unanswered_in_a_row = 0
         self.frames = 0
         self._path = path
         self._robot = robot
@@ -56,9 +59,12 @@ class Replayer:
         self._stop = threading.Event()
         self._answers = Inbox()
         self._answered: dict[str, FrameId] = {}
+        self._missing: list[str] = []
         self._publishers: dict[str, Publisher] = {}
         self._camera: CameraInfo | None = None
         self._last: OfFrame | None = None
+        # Until we are left, also past the end: a stage that is gone counts for nothing in answers that are still to come.
+        self._declared: list[Any] = []
         self._session: zenoh.Session
         self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
 
@@ -74,6 +80,7 @@ class Replayer:
     def __exit__(self, *_: object) -> None:
         self._stop.set()
         self._thread.join(STOP_S)
+        self._declared.clear()
 
     def is_over(self) -> bool:
         """Whether all has been said."""
@@ -82,12 +89,10 @@ class Replayer:
     # --- in the thread ------------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        declared: list[Any] = [
-            self._session.declare_subscriber(t.key(self._robot), self._answers.store) for t in self._answering
-        ]
+        self._declared += [self._session.declare_subscriber(t.key(self._robot), self._answers.store) for t in self._answering]
         instance = f"replay-{os.getpid()}"
         tokens = [topics.alive_key(self._robot, stage, instance) for stage in sorted(self._replayed)]
-        declared += [self._session.liveliness().declare_token(token) for token in tokens]
+        self._declared += [self._session.liveliness().declare_token(token) for token in tokens]
         try:
             self._play(instance)
         except McapFileError as error:
@@ -96,7 +101,6 @@ class Replayer:
             self.failure = f"Zenoh: {first_line(error)}"
         finally:
             self._say_ended()
-            del declared
 
     def _play(self, instance: str) -> None:
         reader = McapReader(self._path)
@@ -106,6 +110,9 @@ class Replayer:
                 if self._stop.is_set():
                     return
                 self._feed(group)
+                if self._unanswered_in_a_row == MOST_UNANSWERED:
+                    self.failure = f"{MOST_UNANSWERED} frames in a row were not answered on {', '.join(self._missing)}"
+                    return
         else:
             self._play_at_own_rate(lines, instance)
         if reader.cut:
@@ -116,7 +123,10 @@ class Replayer:
         restamper: Restamper | None = None
         for line in lines:
             after_s = pace.after_s(line)
-            if self._stop.wait(max(0.0, began_s + after_s - time.monotonic())):
+            wait_s = began_s + after_s - time.monotonic()
+            if wait_s > TELL_OF_HOLE_S:
+                log.warning("'%s' has a hole: nothing is said for %.0f s (--lockstep does not wait)", self._path, wait_s)
+            if self._stop.wait(max(0.0, wait_s)):
                 return
             message = line.message
             if restamper is None and isinstance(message, OfFrame | CameraInfo):
@@ -134,17 +144,20 @@ class Replayer:
         if frame_id is None or not self._answerable <= {line.topic for line in group}:
             return
         until_s = time.monotonic() + ANSWER_TIMEOUT_S
-        while not self._has_answers(frame_id) and not self._stop.is_set():
+        while self._without_answer(frame_id) and not self._stop.is_set():
             if time.monotonic() > until_s:
                 self.unanswered += 1
+                self._unanswered_in_a_row += 1
+                self._missing = self._without_answer(frame_id)
                 return
             self._answers.wait(0.1)
             for received in self._answers.take_all():
                 if isinstance(received.message, OfFrame):
                     self._answered[received.topic.path] = received.message.frame_id
+        self._unanswered_in_a_row = 0
 
-    def _has_answers(self, frame_id: FrameId) -> bool:
-        return all(self._answered.get(topic.path) == frame_id for topic in self._answering)
+    def _without_answer(self, frame_id: FrameId) -> list[str]:
+        return [topic.path for topic in self._answering if self._answered.get(topic.path) != frame_id]
 
     def _say(self, line: Line, message: Message | None) -> None:
         key = _key_of(self._robot, line.key)

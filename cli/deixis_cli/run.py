@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from deixis_runtime.host import SOURCE, HostFailed, HostOptions
+from deixis_schemas import topics
 from rich.console import Console
 
 from . import wording
 from .live_view import view_for
-from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site
+from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site, seconds
 from .play import PlayResult, play
 from .source import Source, read_source
 
@@ -36,7 +37,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--loop", action="store_true", help="play a file again and again")
     add_out(parser)
     parser.add_argument("--expect", metavar="POI_ID", help="succeed only if the single final answer is exactly this POI")
-    parser.add_argument("--timeout", type=float, metavar="SECONDS", help="give up when the source has not ended by then")
+    parser.add_argument("--timeout", type=seconds, metavar="SECONDS", help="give up when the source has not ended by then")
     add_json(parser, "print one JSON document at the end, and nothing before")
     parser.set_defaults(run=run)
 
@@ -56,6 +57,8 @@ def out_options(given: argparse.Namespace, name: str) -> dict[str, Any]:
     if given.out is None and given.pictures:
         raise CommandError("--pictures goes with --out")
     mcap = None if given.out is None else given.out / f"{name}.mcap"
+    if mcap is not None and mcap.exists():  # before NAME.jsonl beside it is begun anew
+        raise CommandError(f"'{mcap}' exists already, and a recording is never written over; give another --out")
     return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
 
 
@@ -101,16 +104,21 @@ def print_answers(console: Console, result: PlayResult, names: dict[str, str]) -
     """The final answers, and how the run fared, as text; nothing for a source that gave no frame."""
     for target in result.targets:
         console.out(f"\n{wording.answer_text(target, names)}", highlight=False)
-    if not result.frames:
+    counts = result.counters
+    answered = counts.get("Belief", 0)
+    if not (result.frames or answered):
         return
     if not result.targets:
         console.out("\nNobody was seen pointing.", highlight=False)
-    counts = result.counters
-    played = f"\n{result.frames} frames in {result.wall_s:.1f} s, {counts.get('Belief', 0)} answered"
+    # A recording may speak for the stages behind the camera alone: then nobody sends frames, and they are answered.
+    played = f"\n{result.frames or answered} frames in {result.wall_s:.1f} s, {answered} answered"
     rejected = f", {counts['rejected']} messages refused" if counts.get("rejected") else ""
     console.out(f"{played}{rejected}.", highlight=False)
-    share = counts.get("Belief", 0) / result.frames
-    if share < ENOUGH_ANSWERED:
+    share = answered / (result.frames or answered)
+    fusion = result.health.get(topics.BELIEF.stage)
+    if not share and fusion is not None and fusion.reason:
+        console.out(f"No frame was answered; fusion is {fusion.state}: {fusion.reason}", highlight=False)
+    elif 0 < share < ENOUGH_ANSWERED:
         console.out(
             f"Only {share:.0%} of the frames were answered: this machine is too slow or too busy for the source's rate. "
             "Free it, lower the rate (--set camera.rate_hz=15), or play recordings with --lockstep.",

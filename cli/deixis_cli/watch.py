@@ -18,7 +18,7 @@ from . import wording
 from .first_answer import FirstAnswer
 from .gets import get_names, get_state
 from .inbox import Inbox, Received
-from .options import CommandError, add_connect, add_json, add_robot
+from .options import CommandError, add_connect, add_json, add_robot, seconds
 from .recorder import line_of
 from .summary import Summary
 
@@ -34,7 +34,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser("watch", help="live answers", description=__doc__)
     add_robot(parser)
     add_connect(parser)
-    parser.add_argument("--seconds", type=float, metavar="N", help="stop after so long (default: on Ctrl-C)")
+    parser.add_argument("--seconds", type=seconds, metavar="N", help="stop after so long (default: on Ctrl-C)")
     parser.add_argument(
         "--until-answer", action="store_true", help="print the first final answer alone, also one given before, and stop"
     )

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import socket
+import sys
 import time
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import Any, NoReturn
 
 import zenoh
 from deixis_cli.mcap_file import McapFileError
 from deixis_cli.options import CommandError, add_json
+from deixis_runtime.certificates import add_certificates
 from deixis_runtime.router import router_config
 from deixis_runtime.session import DEFAULT_ENDPOINT, close, first_line, open_client
 from deixis_runtime.settings import checked_name
@@ -23,7 +27,7 @@ from deixis_schemas import topics
 from .examination import Examination
 from .procedure import examine_running, examine_started
 from .recording import SHIPPED, Recording, RecordingError, read_recording
-from .report import document, print_report, write_junit
+from .report import document, print_report, unseen, write_junit
 from .results import Result
 from .subject import Subject, SubjectError
 
@@ -42,6 +46,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="of a running stage: its router (default: %(default)s)"
     )
+    add_certificates(parser)
     parser.add_argument(
         "--recording", type=Path, default=SHIPPED, metavar="FILE.mcap", help="what to feed (default: one that ships)"
     )
@@ -51,7 +56,7 @@ def register(subparsers: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Check the stage. 1 when it breaks the contract. Raises CommandError, or Unreachable without a router."""
+    """Check the stage. 1 when it breaks the contract or says nothing. Raises CommandError, Unreachable, SystemExit."""
     if (given.start is None) == (given.robot is None):
         raise CommandError("give --command to start the stage, or --robot (and --connect) of one that runs")
     began_s = time.monotonic()
@@ -70,24 +75,32 @@ def run(given: argparse.Namespace) -> int:
         print(json.dumps(document(given.stage, results, seconds)))
     else:
         print_report(given.stage, results, seconds)
-    return 1 if any(result.outcome == "failed" for result in results) else 0
+    return 1 if unseen(results) or any(result.outcome == "failed" for result in results) else 0
 
 
 def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
     with ExitStack() as stack:
+        stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, _leave))
         if given.start is None:
+            # Who joins a stream may get a message before its key is declared; Zenoh says so on standard output, amid our JSON.
+            zenoh.init_log_from_env_or("error,zenoh::api::session=off")
             session = stack.enter_context(open_client(given.connect, shared_memory=False))
             exam = Examination(session, given.robot, given.stage, recording, lambda: True)
-            exam.listen()
+            exam.listen(all_keys=False)
             return examine_running(exam, recording)
         endpoint, session = stack.enter_context(own_router())
         # A name of its own: whatever else runs there hears nothing of it.
         robot = f"check-{uuid.uuid4().hex[:8]}"
         subject = Subject(given.start, robot, endpoint)
         exam = Examination(session, robot, given.stage, recording, subject.running)
-        exam.listen()
+        exam.listen(all_keys=True)
         stack.enter_context(subject)
         return examine_started(exam, subject, recording)
+
+
+def _leave(number: int, _frame: FrameType | None) -> NoReturn:
+    """On the way out the stage that we have started is ended, which otherwise would stay."""
+    sys.exit(128 + number)
 
 
 @contextmanager

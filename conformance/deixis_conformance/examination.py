@@ -13,11 +13,11 @@ import zenoh
 from deixis_cli.gets import Refusal, get_all
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, Frame, FrameId, Health, Message, OfFrame, Produced
-from deixis_schemas.topics import Topic
+from deixis_schemas.topics import Delivery, Topic
 
 from .garbage import garbage_for
 from .observation import Fed, Heard, Phase
-from .recording import Moment, Recording, raw_frame, renamed
+from .recording import Moment, Recording, jpeg_frame, raw_frame, renamed
 
 WE = "check"
 SETTLE_S = 0.5
@@ -46,10 +46,13 @@ class Examination:
         self._stamp_ns = time.time_ns()
         self._inputs = topics.INPUTS[stage]
 
-    def listen(self) -> None:
-        """Hear all of the robot from now on; what we say ourselves is not among it."""
-        key = f"deixis/{self.robot}/**"
-        self._declared.append(self._session.declare_subscriber(key, self._store))
+    def listen(self, *, all_keys: bool) -> None:
+        """Hear the robot from now on; what we say ourselves is not among it.
+
+        Without `all_keys` by keys that access control gives to all roles: of one that takes in frames, nothing would come.
+        """
+        for key in [f"deixis/{self.robot}/**"] if all_keys else watched_keys(self.robot, self.stage):
+            self._declared.append(self._session.declare_subscriber(key, self._store))
 
     def speak(self) -> None:
         """Stand in for the stages that are listened to, and the camera: they are alive, their lens and place are known."""
@@ -127,13 +130,15 @@ class Examination:
 
         without: an input that is left out. late_s: how long ago they were captured, by their stamps.
         """
+        # Before the clock runs: on a busy machine the last of a burst would be too old before it is said.
+        prepared = [_with_picture(moment, as_jpeg=as_jpeg) for moment in moments]
         began_s, began_ns = time.monotonic(), time.time_ns()
         first_s = moments[0].after_s
-        for number, moment in enumerate(moments):
+        for number, moment in enumerate(prepared):
             due_s = number * every_s if every_s is not None else moment.after_s - first_s
             time.sleep(max(0.0, began_s + due_s - time.monotonic()))
-            stamp_ns = began_ns + round(due_s * 1e9) - round(late_s * 1e9) + (0 if every_s else number)
-            phase.fed.append(self._say_moment(moment, stamp_ns, as_jpeg=as_jpeg, without=without))
+            stamp_ns = began_ns + round((time.monotonic() - began_s - late_s) * 1e9) + number
+            phase.fed.append(self._say_moment(moment, stamp_ns, without=without))
 
     def put_garbage_on_inputs(self) -> None:
         """Every broken message on every input."""
@@ -148,15 +153,13 @@ class Examination:
                 self.put_garbage += 1
             self._session.delete(topic.key(self.robot, id="broken"), allowed_destination=REMOTE)
 
-    def _say_moment(self, moment: Moment, stamp_ns: int, *, as_jpeg: bool, without: Topic | None) -> Fed:
+    def _say_moment(self, moment: Moment, stamp_ns: int, *, without: Topic | None) -> Fed:
         frame_id = FrameId(self._run, self._seq)
         self._seq += 1
         for topic in self._inputs:
             message = moment.messages.get(topic)
             if message is None or topic is without:
                 continue
-            if isinstance(message, Frame) and not as_jpeg:
-                message = raw_frame(message)
             named = renamed(message, frame_id, stamp_ns)
             self._put(topic, named.model_copy(update={"instance": WE}))
         return Fed(frame_id, stamp_ns, time.monotonic())
@@ -202,6 +205,23 @@ class Examination:
 
 MAX_ONCE = 32
 REMOTE = zenoh.Locality.REMOTE
+
+
+def watched_keys(robot: str, stage: str) -> list[str]:
+    """What is heard beside a stage that runs: all of the stage, and of the others all but frames that it does not live on."""
+    others = [topic for topic in topics.TOPICS if topic.delivery is not Delivery.REPLY and topic is not topics.HEALTH]
+    wanted = [topic for topic in others if topic.stage != stage]
+    if topics.TRACKS.stage != stage:
+        wanted = [topic for topic in wanted if topic is not topics.FRAME]
+    return [f"deixis/{robot}/{stage}/**", *(topic.key(robot, id="*") for topic in wanted)]
+
+
+def _with_picture(moment: Moment, *, as_jpeg: bool) -> Moment:
+    messages = dict(moment.messages)
+    for topic, message in moment.messages.items():
+        if isinstance(message, Frame):
+            messages[topic] = jpeg_frame(message) if as_jpeg else raw_frame(message)
+    return Moment(messages, moment.after_s)
 
 
 def _say(refusals: Sequence[Refusal]) -> str:

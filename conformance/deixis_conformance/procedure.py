@@ -26,6 +26,7 @@ POLL_S = 0.05
 TOKEN_GONE_WITHIN_S = 4.0
 JSON = "format=json"
 POI_ID = "check"
+LET_DELIVER = "let the camera deliver; over a link, by a certificate (--certs) of somebody who may listen"
 AS_JSON = "answer in JSON where the selector asks for it"
 STORED = "answer a get with a payload on fusion/poi/{id} with the stored POI, when it is on disk"
 NAMED = "answer with an error that names the field"
@@ -145,7 +146,7 @@ def _watch(exam: Examination, instances: list[str]) -> list[Result]:
     phase.fed = answer_checks.fed_of(phase, exam.stage)
     if not phase.fed:
         path = [topic.path for topic in topics.INPUTS[exam.stage] if topic.max_age_s is not None][-1]
-        return [Result("answers", "skipped", f"nothing came on {path} within {WATCH_S:g} s", "let the camera deliver")]
+        return [Result("answers", "skipped", f"nothing came on {path} within {WATCH_S:g} s", LET_DELIVER)]
     return answer_checks.check_answers(exam.stage, phase) + _common(exam, instances, alone=False)
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import signal
 import subprocess
-import tempfile
+import threading
 import time
-from pathlib import Path
-from typing import Self
+from contextlib import suppress
+from typing import IO, Self
 
 STOP_WITHIN_S = 2.0
 KILLED_WITHIN_S = 5.0
+READ_OUT_WITHIN_S = 0.5
 TAIL_BYTES = 2000
 
 
@@ -20,7 +22,7 @@ class SubjectError(Exception):
 
 
 class Subject:
-    """A process with its log. Use as a context manager: it does not outlive it."""
+    """A process and the end of what it prints. Use as a context manager: neither it nor what it started outlives it."""
 
     def __init__(self, command: str, robot: str, endpoint: str) -> None:
         """In `command`, `{robot}` and `{connect}` stand for the robot's name and the router's endpoint. Raises SubjectError."""
@@ -31,26 +33,29 @@ class Subject:
         if not words or "{connect}" not in command or "{robot}" not in command:
             raise SubjectError("--command needs {robot} and {connect} where the stage's command line takes them")
         self.argv = [word.replace("{robot}", robot).replace("{connect}", endpoint) for word in words]
-        self._folder = tempfile.TemporaryDirectory(prefix="deixis-check-")
-        self._log = Path(self._folder.name) / "log"
+        self._printed = b""
         self._popen: subprocess.Popen[bytes]
+        self._reader: threading.Thread
 
     def __enter__(self) -> Self:
-        with self._log.open("wb") as file:
-            try:
-                self._popen = subprocess.Popen(
-                    self.argv, stdin=subprocess.DEVNULL, stdout=file, stderr=file, start_new_session=True
-                )
-            except OSError as error:
-                self._folder.cleanup()
-                raise SubjectError(f"--command: '{self.argv[0]}' cannot be started: {error.strerror}") from None
+        try:
+            self._popen = subprocess.Popen(
+                self.argv, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        except (OSError, ValueError) as error:  # ValueError: a NUL in a word
+            why = error.strerror if isinstance(error, OSError) else error
+            raise SubjectError(f"--command: '{self.argv[0]}' cannot be started: {why}") from None
+        assert self._popen.stdout is not None
+        # A file would fill the disk where the stage prints without end.
+        self._reader = threading.Thread(target=self._read, args=(self._popen.stdout,), name="subject-output", daemon=True)
+        self._reader.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.running():
-            self._popen.kill()
-            self._popen.wait(KILLED_WITHIN_S)
-        self._folder.cleanup()
+        with suppress(ProcessLookupError):  # nobody of its group is left
+            os.killpg(self._popen.pid, signal.SIGKILL)
+        self._popen.wait(KILLED_WITHIN_S)
+        self._reader.join(READ_OUT_WITHIN_S)
 
     def running(self) -> bool:
         """Whether it has not ended."""
@@ -71,5 +76,12 @@ class Subject:
         return time.monotonic() - began_s
 
     def last_words(self) -> str:
-        """The end of its log."""
-        return self._log.read_bytes()[-TAIL_BYTES:].decode(errors="replace").strip()
+        """The end of what it has printed."""
+        if not self.running():
+            self._reader.join(READ_OUT_WITHIN_S)
+        return self._printed.decode(errors="replace").strip()
+
+    def _read(self, pipe: IO[bytes]) -> None:
+        with pipe:
+            while chunk := os.read(pipe.fileno(), 65_536):
+                self._printed = (self._printed + chunk)[-TAIL_BYTES:]

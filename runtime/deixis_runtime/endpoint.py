@@ -25,8 +25,11 @@ class NotAnEndpoint(ValueError):
     """A text that is no endpoint; says what is missing."""
 
 
-def read_endpoint(text: str) -> Endpoint:
-    """The parts of `PROTOCOL/HOST:PORT` (metadata and settings behind `?` and `#` left out). Raises NotAnEndpoint."""
+def read_endpoint(text: str, *, least_port: int = 1) -> Endpoint:
+    """The parts of `PROTOCOL/HOST:PORT` (metadata and settings behind `?` and `#` left out). Raises NotAnEndpoint.
+
+    `least_port` is 0 for who listens: there it means any port that is free.
+    """
     protocol, slash, rest = text.partition("/")
     if not slash or protocol not in PROTOCOLS:
         raise NotAnEndpoint(f"'{text}' is not an endpoint: it has to begin with {', '.join(f'{name}/' for name in PROTOCOLS)}")
@@ -34,7 +37,7 @@ def read_endpoint(text: str) -> Endpoint:
     if protocol == SOCKET:
         return Endpoint(protocol, address, 0)
     host, colon, port = address.rpartition(":")
-    if not colon or not host or not port.isdigit() or not 0 < int(port) < 65536:
+    if not colon or not host or not port.isdigit() or not least_port <= int(port) < 65536:
         raise NotAnEndpoint(f"'{text}' is not an endpoint: behind {protocol}/ it needs HOST:PORT, as in {protocol}/edge:7447")
     return Endpoint(protocol, host.strip("[]"), int(port))
 

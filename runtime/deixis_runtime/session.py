@@ -15,7 +15,7 @@ from typing import Any
 import zenoh
 
 from .certificates import VARIABLE, certificates_of
-from .endpoint import is_guarded
+from .endpoint import NotAnEndpoint, is_guarded, read_endpoint
 from .finding import Finding
 from .leftovers import let_go
 from .tls import tls_settings
@@ -93,6 +93,10 @@ def _unreachable(endpoint: str, said: str) -> Unreachable:
     # Here, for it needs `ssl`, and a session that opens does not.
     from .unanswered import wants_tls, why_unanswered  # noqa: PLC0415
 
+    try:
+        read_endpoint(endpoint)
+    except NotAnEndpoint as error:
+        return Unreachable(str(error))
     why = why_unanswered(endpoint, certificates_of()) if is_guarded(endpoint) else wants_tls(endpoint)
     if why is None:
         advice = "start one with 'deixis run' or 'deixis up', or name another with --connect"

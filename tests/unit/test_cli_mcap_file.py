@@ -114,3 +114,10 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
             list(McapReader(path))
     with pytest.raises(McapFileError, match=r"a\.mcap"):
         McapRecorder(Path("/proc/a.mcap"))
+
+
+def test_a_recording_is_never_written_over(tmp_path):
+    path = written(tmp_path / "a.mcap", SENT)
+    with pytest.raises(McapFileError, match=r"a\.mcap' exists already"):
+        McapRecorder(path)
+    assert list(McapReader(path)) == SENT

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
-from deixis_cli.options import CommandError, add_host, add_robot, host_options, quoted, read_site, stage_settings
+from deixis_cli.options import CommandError, add_host, add_robot, host_options, quoted, read_site, seconds, stage_settings
 from deixis_runtime import host
 from deixis_runtime.host import HostFailed
+from deixis_runtime.session import Unreachable, open_client
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -102,3 +103,19 @@ def test_what_is_not_installed_is_not_started_and_said(tmp_path, monkeypatch, ca
     site.write_text("settings: {gaze: {x: 1}}")
     with pytest.raises(CommandError, match=r"settings\.gaze: there is no such stage \(camera, tracker"):
         read_site(site)
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "1e999", "soon", ""])
+def test_a_time_that_is_none_is_refused(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="no number of seconds"):
+        seconds(text)
+    assert seconds("0.5") == 0.5
+
+
+def test_a_slip_in_an_endpoint_is_named_before_anything_starts():
+    for text in ("nonsense", "", "http://here:80", "tcp/here", "tcp/here:99999"):
+        with pytest.raises(CommandError, match=f"--listen: '{text}' is not an endpoint"):
+            options("--listen", text)
+        with pytest.raises(Unreachable, match=f"^'{text}' is not an endpoint"), open_client(text):
+            pass
+    assert options("--listen", "tcp/127.0.0.1:0").listen == ("tcp/127.0.0.1:0",)

@@ -3,6 +3,7 @@
 import argparse
 
 import pytest
+from deixis_cli import replayer
 from deixis_cli.frame_groups import LOOK_AHEAD_NS, Line, by_frame
 from deixis_cli.mcap_file import McapRecorder
 from deixis_cli.options import CommandError
@@ -10,11 +11,14 @@ from deixis_cli.pace import Pace
 from deixis_cli.raw_message import RawMessage
 from deixis_cli.replay import register, run, stages_in
 from deixis_cli.restamp import Restamper
+from deixis_conformance.command import own_router
+from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, FrameId, OfFrame
 from deixis_schemas.samples import FRAME, SAMPLES
 from hypothesis import given
 from hypothesis import strategies as st
+from running import wait_until
 
 SAMPLE = {type(message).__name__: message for message in SAMPLES}
 MS = 1_000_000
@@ -143,6 +147,64 @@ def test_what_cannot_be_played_is_refused_with_what_to_do(tmp_path, arguments, t
     path = recorded(tmp_path / "a.mcap", "CameraInfo", "Tracks")
     with pytest.raises(CommandError, match=text):
         run(given_(path, *arguments))
+
+
+@pytest.mark.parametrize("stage", ["gesture", "fusion"])
+def test_a_stage_that_would_wait_in_vain_for_each_frame_is_refused(tmp_path, stage):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
+    with pytest.raises(CommandError, match=f"{stage} would run without tracks: give --as tracker,camera, or --except {stage}"):
+        run(given_(path, "--as", "camera", "--only", stage))
+
+
+def test_a_recording_is_not_replayed_into_itself_and_what_lies_beside_it_stays(tmp_path):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
+    (tmp_path / "a.jsonl").write_text("what was said")
+    with pytest.raises(CommandError, match=r"a\.mcap' exists already.*give another --out"):
+        run(given_(path, "--out", tmp_path))
+    assert stages_in(path) == {"camera"}
+    assert (tmp_path / "a.jsonl").read_text() == "what was said"
+
+
+def test_a_replay_in_lockstep_does_not_wait_for_ever_for_stages_that_answer_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(replayer, "ANSWER_TIMEOUT_S", 0.05)
+    path = tmp_path / "a.mcap"
+    with McapRecorder(path) as recorder:
+        for seq in range(9):
+            frame = FRAME.model_copy(update={"seq": seq})
+            recorder.write(RawMessage("deixis/r1/camera/frame", codec.encoding_of(type(frame)), codec.encode(frame), seq))
+    playing = replayer.Replayer(path, "r1", {"camera"}, {"tracker"}, lockstep=True, pois=False)
+    with own_router() as (_, session), playing.on(session):
+        wait_until(playing.is_over, "its end", 10)
+    assert playing.failure == "3 frames in a row were not answered on tracker/tracks"
+    assert playing.frames == 3
+
+
+def test_a_hole_in_a_recording_is_told_of_and_its_end_is_not_waited_for_when_told_to_stop(tmp_path, caplog):
+    path = tmp_path / "a.mcap"
+    with McapRecorder(path) as recorder:
+        for at_s in (0, 3600):
+            label = codec.encoding_of(type(FRAME))
+            recorder.write(RawMessage("deixis/r1/camera/frame", label, codec.encode(FRAME), at_s * 10**9))
+    playing = replayer.Replayer(path, "r1", {"camera"}, {"tracker"}, lockstep=False, pois=False)
+    with own_router() as (_, session), playing.on(session):
+        wait_until(lambda: "nothing is said for 3600 s" in caplog.text, "a word", 10)
+    assert playing.is_over()
+    assert playing.frames == 1
+
+
+def test_the_stages_spoken_for_are_alive_until_the_last_answer_is_heard(tmp_path):
+    playing = replayer.Replayer(
+        recorded(tmp_path / "a.mcap", "Tracks"), "r1", {"tracker"}, {"gesture"}, lockstep=False, pois=False
+    )
+    with own_router() as (endpoint, session), open_client(endpoint, shared_memory=False) as other:
+
+        def alive():
+            return [reply.ok for reply in other.liveliness().get("deixis/r1/@alive/tracker/*", timeout=1.0)]
+
+        with playing.on(session):
+            wait_until(playing.is_over, "its end", 10)
+            assert alive()
+        wait_until(lambda: not alive(), "the end of its tokens", 5)
 
 
 def test_a_missing_recording_is_named():

@@ -13,6 +13,7 @@ from deixis_schemas.samples import FRAME, SAMPLES
 from rich.console import Console
 
 TARGET = next(message for message in SAMPLES if type(message).__name__ == "Target")
+HEALTH = next(message for message in SAMPLES if type(message).__name__ == "Health")
 CAMERA = next(message for message in SAMPLES if type(message).__name__ == "CameraInfo")
 NAMES = {"vase": "the blue vase"}
 
@@ -57,6 +58,30 @@ def test_the_answer_is_printed_with_name_belief_conflict_and_reason():
     text = console.export_text()
     for part in ("the blue vase (vase)", "belief 0.900", "conflict 0.000", TARGET.reason, "9 answered", "2 messages refused"):
         assert part in text
+
+
+@pytest.mark.parametrize(
+    ("answered", "fusion", "said", "unsaid"),
+    [
+        (0, {"state": "degraded", "reason": "tracker is dead"}, "fusion is degraded: tracker is dead", "too slow"),
+        (0, None, "9 frames in 0.0 s, 0 answered.", "too slow"),
+        (2, {"state": "ok"}, "Only 22% of the frames were answered: this machine is too slow", "No frame was"),
+    ],
+)
+def test_where_frames_go_unanswered_it_is_said_whose_fault_it_is(answered, fusion, said, unsaid):
+    console = Console(record=True, file=open("/dev/null", "w"), width=200)  # noqa: SIM115
+    health = {} if fusion is None else {"fusion": HEALTH.model_copy(update=fusion)}
+    print_answers(console, PlayResult(frames=9, health=health, counters={"Belief": answered}), NAMES)
+    text = console.export_text()
+    assert said in text
+    assert unsaid not in text
+
+
+def test_a_recording_without_frames_is_told_of_as_well():
+    console = Console(record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    print_answers(console, PlayResult(frames=0, counters={"Belief": 9}), NAMES)
+    assert "Nobody was seen pointing." in (text := console.export_text())
+    assert "9 frames in 0.0 s, 9 answered." in text
 
 
 def test_the_json_document_can_be_read_and_holds_the_answers():

@@ -1,6 +1,12 @@
 """What the checks of a stage make of what was fed and heard."""
 
+from itertools import combinations
+from xml.etree import ElementTree
+
 import pytest
+import zenoh
+from deixis_cli.mcap_file import McapRecorder
+from deixis_cli.raw_message import RawMessage
 from deixis_conformance.answer_checks import (
     check_answers,
     check_backlog,
@@ -12,12 +18,13 @@ from deixis_conformance.answer_checks import (
     fed_of,
 )
 from deixis_conformance.camera_checks import check_camera
+from deixis_conformance.examination import watched_keys
 from deixis_conformance.garbage import garbage_for
 from deixis_conformance.health_checks import check_health, check_says_rejected
 from deixis_conformance.observation import Fed, Heard, Phase
 from deixis_conformance.payload_checks import check_payloads, check_producer
-from deixis_conformance.recording import SHIPPED, RecordingError, read_recording
-from deixis_conformance.report import write_junit
+from deixis_conformance.recording import SHIPPED, RecordingError, jpeg_frame, raw_frame, read_recording
+from deixis_conformance.report import print_report, unseen, write_junit
 from deixis_conformance.results import Result
 from deixis_schemas import Producer, codec, topics
 from deixis_schemas.messages import FrameId, Gestures, InputHealth
@@ -219,12 +226,49 @@ def test_the_shipped_recording_feeds_each_stage_with_all_of_its_inputs(stage):
 
 
 def test_a_recording_without_what_a_stage_needs_is_refused(tmp_path):
-    from deixis_cli.mcap_file import McapRecorder
-
     with McapRecorder(tmp_path / "empty.mcap"):
         pass
-    with pytest.raises(RecordingError, match=r"empty\.mcap' holds no frame with all of camera/frame"):
+    with pytest.raises(RecordingError, match=r"empty\.mcap' holds 0 frames with all of camera/frame; 40 are needed"):
         read_recording(tmp_path / "empty.mcap", topics.INPUTS["tracker"])
+
+
+def recorded(path, frames):
+    with McapRecorder(path) as recorder:
+        for frame in frames:
+            label = codec.encoding_of(type(frame))
+            recorder.write(RawMessage("deixis/r1/camera/frame", label, codec.encode(frame), frame.stamp_ns))
+    return path
+
+
+def frames_at(*times_s, **changes):
+    return [FRAME.model_copy(update={"seq": seq, "stamp_ns": round(at_s * 1e9), **changes}) for seq, at_s in enumerate(times_s)]
+
+
+def test_a_recording_that_is_too_short_for_the_checks_is_refused(tmp_path):
+    path = recorded(tmp_path / "short.mcap", frames_at(*(seq / 30 for seq in range(39))))
+    with pytest.raises(RecordingError, match="holds 39 frames"):
+        read_recording(path, topics.INPUTS["tracker"])
+
+
+def test_of_a_long_recording_only_what_is_fed_is_kept_and_its_holes_are_short(tmp_path):
+    times_s = [*(seq / 30 for seq in range(10)), *(3600 + seq / 30 for seq in range(100))]
+    moments = read_recording(recorded(tmp_path / "long.mcap", frames_at(*times_s)), topics.INPUTS["tracker"]).moments
+    assert len(moments) == 64
+    assert moments[-1].after_s == pytest.approx(62 / 30 + 0.5)
+
+
+def test_frames_whose_picture_cannot_be_read_are_not_fed(tmp_path):
+    good = frames_at(*(seq / 30 for seq in range(40)))
+    bad = frames_at(2.0, 2.1, encoding="jpeg", data=b"\xff\xd8 of no picture")
+    moments = read_recording(recorded(tmp_path / "a.mcap", [*good, *bad]), topics.INPUTS["tracker"]).moments
+    assert len(moments) == 40
+
+
+def test_a_picture_is_fed_raw_and_as_jpeg_however_it_was_recorded():
+    jpeg = jpeg_frame(raw := FRAME.model_copy(update={"encoding": "bgr8", "width": 16, "height": 8, "data": b"\x80" * 384}))
+    assert jpeg.encoding == "jpeg"
+    assert raw_frame(jpeg) == raw
+    assert (jpeg_frame(jpeg), raw_frame(raw)) == (jpeg, raw)
 
 
 @pytest.mark.parametrize("topic", [topic for inputs in topics.INPUTS.values() for topic in inputs], ids=lambda t: t.path)
@@ -245,3 +289,33 @@ def test_a_watched_stage_was_fed_what_came_on_the_last_of_its_inputs():
 def test_junit_that_cannot_be_written_is_an_error(tmp_path):
     with pytest.raises(OSError, match="No such file"):
         write_junit(tmp_path / "none" / "report.xml", "gesture", [Result("a", "passed", "b")], 1.0)
+
+
+def test_junit_is_xml_whatever_a_stage_has_printed(tmp_path):
+    write_junit(tmp_path / "a.xml", "gesture", [Result("starts", "failed", "its log: \x1b[31mno\0 model\ud800 é", "b")], 1.0)
+    assert ElementTree.parse(tmp_path / "a.xml").find("testcase/failure").get("message") == "its log: [31mno model é"
+
+
+# --- a stage that runs already ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stage", topics.STAGES)
+def test_beside_a_running_stage_no_key_is_heard_twice_and_frames_only_by_whom_they_concern(stage):
+    keys = [zenoh.KeyExpr(key) for key in watched_keys("r1", stage)]
+    assert not [pair for pair in combinations(keys, 2) if pair[0].intersects(pair[1])]
+
+    def hears(topic):
+        return any(key.intersects(zenoh.KeyExpr(topic.key("r1", id="*", stage=stage))) for key in keys)
+
+    # A subscription that takes in frames is denied whole to viewers and robots.
+    assert hears(topics.FRAME) == (stage in ("camera", "tracker"))
+    assert all(hears(topic) for topic in topics.INPUTS[stage] if topic is not topics.FRAME)
+    assert hears(topics.HEALTH)
+
+
+@pytest.mark.parametrize(("outcome", "verdict"), [("skipped", "was not seen at work"), ("passed", "keeps the contract")])
+def test_a_stage_that_was_not_seen_at_work_is_not_said_to_keep_the_contract(outcome, verdict, capsys):
+    results = [Result("liveliness", "passed", "its token stands"), Result("answers", outcome, "nothing came", "")]
+    print_report("gesture", results, 1.0)
+    assert f"gesture: {verdict} (" in capsys.readouterr().out
+    assert unseen(results) == (outcome == "skipped")
