@@ -58,7 +58,10 @@ def run(given: argparse.Namespace) -> int:
     console = Console()
     with nullcontext() if given.json else view_for(console, names, options.stages) as shown:
         result = play(
-            options, **out_options(given, given.file.stem), on_message=shown.hear if shown else None, beside=replayer.on
+            options,
+            **out_options(given, given.file.stem, given.file),
+            on_message=shown.hear if shown else None,
+            beside=replayer.on,
         )
     result.failure = result.failure or replayer.failure or _unanswered(replayer)
     names |= result.names

@@ -52,14 +52,26 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def out_options(given: argparse.Namespace, name: str) -> dict[str, Any]:
-    """What `play` is to write, of a run of this name. Raises CommandError."""
+def out_options(given: argparse.Namespace, name: str, played: Path | None = None) -> dict[str, Any]:
+    """What `play` is to write, of a run of this name. Files of a run before are begun anew, but not the one that is `played`.
+
+    Raises CommandError.
+    """
     if given.out is None and given.pictures:
         raise CommandError("--pictures goes with --out")
     mcap = None if given.out is None else given.out / f"{name}.mcap"
-    if mcap is not None and mcap.exists():  # before NAME.jsonl beside it is begun anew
-        raise CommandError(f"'{mcap}' exists already, and a recording is never written over; give another --out")
+    if mcap is not None and mcap.exists():
+        if played is not None and mcap.samefile(played):
+            raise CommandError(f"'{mcap}' is what is to be played, and would be written over; give another --out")
+        _remove(mcap)
     return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
+
+
+def _remove(mcap: Path) -> None:
+    try:
+        mcap.unlink()
+    except OSError as error:
+        raise CommandError(f"--out {mcap}: {error.strerror}") from None
 
 
 def run(given: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ from deixis_cli.pace import Pace
 from deixis_cli.raw_message import RawMessage
 from deixis_cli.replay import register, run, stages_in
 from deixis_cli.restamp import Restamper
+from deixis_cli.run import out_options
 from deixis_conformance.command import own_router
 from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
@@ -159,10 +160,19 @@ def test_a_stage_that_would_wait_in_vain_for_each_frame_is_refused(tmp_path, sta
 def test_a_recording_is_not_replayed_into_itself_and_what_lies_beside_it_stays(tmp_path):
     path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
     (tmp_path / "a.jsonl").write_text("what was said")
-    with pytest.raises(CommandError, match=r"a\.mcap' exists already.*give another --out"):
+    with pytest.raises(CommandError, match=r"a\.mcap' is what is to be played.*give another --out"):
         run(given_(path, "--out", tmp_path))
     assert stages_in(path) == {"camera"}
     assert (tmp_path / "a.jsonl").read_text() == "what was said"
+
+
+def test_a_second_run_into_one_folder_begins_its_files_anew(tmp_path):
+    path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
+    options = out_options(argparse.Namespace(out=tmp_path, pictures=False), "a")
+    assert options["mcap"] == path
+    with McapRecorder(options["mcap"]):
+        pass
+    assert stages_in(path) == set()
 
 
 def test_a_replay_in_lockstep_does_not_wait_for_ever_for_stages_that_answer_nothing(tmp_path, monkeypatch):
