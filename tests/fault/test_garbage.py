@@ -160,7 +160,7 @@ def test_a_hundred_thousand_payloads_of_garbage_on_all_keys_leave_memory_as_it_i
         running.wait_until(lambda stage=stage: running.health(stage), f"health of {stage}")
         assert running.health(stage)["rss_mb"] < before_mb[stage] + 15, stage
     said = [line for line in running.log.read_text().splitlines()[lines:] if "WARNING" in line]
-    assert len(said) < 200, "said by key and cause, at intervals"
+    assert len(said) < 200 * max(1, FLOOD / 100_000), "said by key and cause, at intervals"
 
 
 def test_thousands_of_gets_with_garbage_are_answered_or_refused_and_change_nothing(running):
