@@ -11,6 +11,7 @@ from deixis_runtime.session import Unreachable, exit_now
 from deixis_runtime.stage import setup_logging
 
 from .options import CommandError
+from .own_output import keep_output_to_ourselves
 
 GROUP = "deixis.commands"
 
@@ -44,6 +45,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def command() -> None:
     """The console script: leaves at once when the command is done, whatever threads a cut session has left."""
+    keep_output_to_ourselves()
     try:
         status = main()
     except SystemExit as error:  # argparse: help or bad usage

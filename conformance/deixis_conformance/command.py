@@ -82,8 +82,6 @@ def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
     with ExitStack() as stack:
         stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, _leave))
         if given.start is None:
-            # Who joins a stream may get a message before its key is declared; Zenoh says so on standard output, amid our JSON.
-            zenoh.init_log_from_env_or("error,zenoh::api::session=off")
             session = stack.enter_context(open_client(given.connect, shared_memory=False))
             exam = Examination(session, given.robot, given.stage, recording, lambda: True)
             exam.listen(all_keys=False)
