@@ -100,6 +100,8 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
     sets[SOURCE] = (*ours, *sets.get(SOURCE, ()))
     if given.registry is not None:
         keeper = topics.POI.stage
+        if keeper not in stages:
+            raise CommandError(f"--registry is for {keeper}, which is not started here")
         sets[keeper] = (f"registry={quoted(str(given.registry.resolve()))}", *sets.get(keeper, ()))
     for stage in sets:
         if sets[stage] and stage not in stages:

@@ -62,7 +62,8 @@ def run(given: argparse.Namespace) -> int:
                 heard = Recording(given.robot, given.connect, recorder, inbox, status, pictures=not given.no_pictures)
                 heard.record(session, interrupts, until_s)
         except McapFileError as error:
-            raise CommandError(str(error)) from None
+            kept = "; what was written until then is kept, and can be replayed" if given.file.exists() else ""
+            raise CommandError(f"{error}{kept}") from None
     print(heard.summary(), file=sys.stderr)
     if not heard.counts:
         given.file.unlink()  # a recording of nothing would only be found again

@@ -64,6 +64,11 @@ def test_a_setting_for_a_stage_that_does_not_start_is_refused():
         options("--only", "camera", "--set", "tracker.x=1")
 
 
+def test_a_registry_for_a_fusion_that_does_not_start_is_refused():
+    with pytest.raises(CommandError, match="--registry is for fusion, which is not started here"):
+        options("--only", "camera", "--registry", "pois.sqlite")
+
+
 def test_a_site_with_settings_of_an_unknown_stage_is_refused_with_file_and_field(tmp_path):
     site = tmp_path / "site.yaml"
     site.write_text("settings: {traker: {x: 1}}")
