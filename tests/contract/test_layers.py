@@ -1,4 +1,4 @@
-"""Arrows point down only: cli, conformance, evaluation, simulation -> services -> runtime -> schemas; no service imports another."""
+"""Arrows point down: cli, conformance, evaluation, simulation -> services -> runtime -> schemas; no service imports another."""
 
 import ast
 from pathlib import Path

@@ -117,10 +117,10 @@ def published_by_tracker(running):
 def test_a_clock_that_is_set_back_by_twelve_minutes_stops_no_answers_and_the_new_skew_is_said(running):
     frames = published_by_tracker(running)
     running.set_clock(BEHIND_S)
-    with running.answers_from_now() as heard:
-        running.wait_until(lambda: published_by_tracker(running) > frames + 2 * RATE_HZ, "frames go on")
-        assert_named(running, heard)
+    running.wait_until(lambda: published_by_tracker(running) > frames + 2 * RATE_HZ, "frames go on")
     assert_skew_is_said(running, BEHIND_S, r"7 min 0 s behind")
+    with running.answers_from_now() as heard:  # until the clocks are compared again, a second or two, a latency may be wrong
+        assert_named(running, heard)
 
 
 def too_old(running, stage):

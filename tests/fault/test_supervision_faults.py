@@ -4,6 +4,7 @@ One system for all, in lockstep, so that a busy machine plays slowly and drops n
 which play live, for only then the stages share memory.
 """
 
+import ctypes
 import json
 import os
 import signal
@@ -22,6 +23,7 @@ from running import CLIP, POINTED_AT, SITE, answers, child_called, children, com
 
 pytestmark = pytest.mark.skipif(bool(missing_for_private_shm()), reason=missing_for_private_shm())
 
+PR_SET_CHILD_SUBREAPER = 36
 ROUTER = "router"
 EVERYBODY = (ROUTER, *topics.STAGES)
 AGAIN_S = 90.0  # other tests run beside these
@@ -246,7 +248,10 @@ def test_a_killed_supervisor_leaves_no_process_and_nothing_else_though_a_stage_a
     live.child.send_signal(signal.SIGSTOP)  # or it would find them
     os.kill(now["headpose"], signal.SIGSTOP)
     os.kill(now[ROUTER], signal.SIGSTOP)
-    # The kernel continues those that stand when their parent ends; a signal sent just before may still be on its way.
+    # As below a program that adopts orphans, like some container's first process: there the kernel does not continue those
+    # that stand by itself.
+    assert ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
+    # They are continued when their parent ends; a signal sent just before may still be on its way.
     live.wait(lambda: stands(now["headpose"]) and stands(now[ROUTER]), "both stand")
     live.child.kill()
     wait_until(lambda: not any(map(runs, pids)), "all children are gone", 5, live.log)
