@@ -43,7 +43,6 @@ class Examination:
         # No run of ours may be one that the stage knows from elsewhere.
         self._run = time.time_ns() // 1_000_000
         self._seq = 0
-        self._stamp_ns = time.time_ns()
         self._inputs = topics.INPUTS[stage]
 
     def listen(self, *, all_keys: bool) -> None:
