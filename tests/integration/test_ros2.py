@@ -35,6 +35,7 @@ HEARD = {
 }
 PATIENCE_S = 60.0
 LONGEST_ANSWER_S = 0.5
+UNDER_WAY = 3
 
 
 def wire_name(type_name):
@@ -43,21 +44,23 @@ def wire_name(type_name):
 
 
 class Clip(threading.Thread):
-    """The example clip as sensor_msgs/Image, again and again, as a ROS camera driver would send it.
+    """The example clip as sensor_msgs/Image, again and again, as a ROS camera driver of 15 Hz would send it.
 
-    At its own rate, or on a busy machine as quickly as the chain answers: what is dropped there is not what is tested here.
+    At that rate, or on a busy machine as quickly as the chain answers: what is dropped there is not what is tested here.
     """
 
     def __init__(self, put):
         super().__init__(daemon=True)
         self._put = put
         self._stopped = threading.Event()
-        self._answered = threading.Event()
+        self._unanswered = 0
+        self._answer = threading.Condition()
         capture = cv2.VideoCapture(str(CLIP))
-        self._period_s = 1 / capture.get(cv2.CAP_PROP_FPS)
-        self._pictures = []
+        self._period_s = 2 / capture.get(cv2.CAP_PROP_FPS)
+        pictures = []
         while (read := capture.read())[0]:
-            self._pictures.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
+            pictures.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
+        self._pictures = pictures[::2]
 
     def run(self):
         due_s = time.monotonic()
@@ -66,12 +69,19 @@ class Clip(threading.Thread):
                 due_s = max(due_s + self._period_s, time.monotonic())
                 if self._stopped.wait(due_s - time.monotonic()):
                     return
-                self._answered.wait(LONGEST_ANSWER_S)
-                self._answered.clear()
+                self._wait_for_answers()
                 self._put(fake_ros.cdr_image(picture, "rgb8", time.time_ns()))
 
+    def _wait_for_answers(self):
+        with self._answer:
+            if not self._answer.wait_for(lambda: self._unanswered < UNDER_WAY, LONGEST_ANSWER_S):
+                self._unanswered = 0
+            self._unanswered += 1
+
     def answered(self, _sample):
-        self._answered.set()
+        with self._answer:
+            self._unanswered = max(0, self._unanswered - 1)
+            self._answer.notify()
 
     def stop(self):
         self._stopped.set()

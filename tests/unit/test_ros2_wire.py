@@ -11,6 +11,7 @@ from deixis_ros2.names import (
     Endpoint,
     NodeName,
     Qos,
+    camera_info_beside,
     dds_type,
     endpoint_token,
     global_id,
@@ -33,6 +34,8 @@ PUBLISHED = {
     "std_msgs/msg/String": STRING_HASH,
     "sensor_msgs/msg/Image": "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
     "sensor_msgs/msg/CompressedImage": "RIHS01_15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a",
+    "geometry_msgs/msg/PoseWithCovarianceStamped": "RIHS01_26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e",
+    "tf2_msgs/msg/TFMessage": "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
     "sensor_msgs/msg/CameraInfo": "RIHS01_b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275",
 }
 # A recorded tf2_msgs/TFMessage, as in the tests of github.com/foxglove/cdr.
@@ -83,6 +86,12 @@ def test_relative_names_lie_in_the_nodes_namespace():
     assert NodeName(0, "/robot1", "n").qualified("camera/image_raw") == "/robot1/camera/image_raw"
     assert NodeName(0, "/", "n").qualified("image_raw") == "/image_raw"
     assert NodeName(0, "/robot1", "n").qualified("/image_raw") == "/image_raw"
+
+
+@pytest.mark.parametrize("image", ["/camera/image_raw", "/camera/image_raw/compressed"])
+def test_the_lens_is_looked_for_beside_the_pictures(image):
+    assert camera_info_beside(image) == "/camera/camera_info"
+    assert camera_info_beside("/image_raw") == "/camera_info"
 
 
 def test_who_publishes_a_topic_is_found_by_its_token_also_with_a_part_more():

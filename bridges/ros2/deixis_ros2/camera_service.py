@@ -11,7 +11,7 @@ from deixis_schemas.messages import CameraState, Frame, HealthState, Message
 
 from .config import RosCameraConfig
 from .intrinsics import LensRefused, RosLens, assumed, of_camera_info
-from .names import Qos, node_name
+from .names import Qos, camera_info_beside, node_name
 from .pictures import PictureRefused, of_compressed, of_image
 from .preparation import Prepared, prepare
 from .ros_node import Arrived, Newest, RosNode
@@ -36,7 +36,7 @@ class RosCameraStage:
         self._ros = ros
         self._types = types
         image = ros.name.qualified(config.image)
-        info = config.camera_info or f"{image.rsplit('/', 1)[0]}/camera_info"
+        info = config.camera_info or camera_info_beside(image)
         image_type = COMPRESSED if config.compressed else IMAGE
         self._images = ros.subscribe(image_type, image, Qos(reliable=False, depth=1), topics.FRAME.max_bytes)
         self._lenses = ros.subscribe(CAMERA_INFO, info, Qos(transient_local=True, depth=1), MAX_CAMERA_INFO_BYTES)

@@ -107,6 +107,11 @@ def node_name(robot: str, part: str) -> str:
     return re.sub("[^A-Za-z0-9_]", "_", f"deixis_{robot}_{part}")
 
 
+def camera_info_beside(image: str) -> str:
+    """The topic of the lens of these pictures, as image_transport places it, also where they are compressed."""
+    return f"{image.removesuffix('/compressed').rsplit('/', 1)[0]}/camera_info"
+
+
 def is_topic(name: str) -> bool:
     """Whether ROS takes this as the name of a topic, relative or full."""
     return re.fullmatch(TOPIC_PATTERN, name) is not None and len(name) <= 255

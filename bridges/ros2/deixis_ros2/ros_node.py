@@ -31,6 +31,7 @@ from .names import (
 from .ros_types import RosTypes
 
 MAX_KNOWN_PUBLISHERS = 64
+STOP_WAIT_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ class RosNode:
     def stop(self) -> None:
         """Leave the ROS graph, and do not try again."""
         self._stopped.set()
-        self._thread.join()
+        self._thread.join(STOP_WAIT_S)
 
     @property
     def linked(self) -> bool:
