@@ -74,6 +74,12 @@ def test_any_answer_comes_back_as_it_went(poi_ids, reason, ended_ns):
     assert message.ended.sec * 10**9 + message.ended.nanosec == ended_ns
 
 
+def test_a_time_beyond_what_ros_can_say_is_its_last_second():
+    far = TARGET.model_copy(update={"stamp_ns": 2**63 - 1, "started_ns": 2**63 - 1})
+    message = JAZZY.decode(POINTED_TARGET, JAZZY.encode(pointed_target(JAZZY, far, "map")))
+    assert message.header.stamp.sec == message.started.sec == 2**31 - 1
+
+
 # --- who is seen where ------------------------------------------------------------------------------------------------
 
 

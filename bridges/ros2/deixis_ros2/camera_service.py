@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 from deixis_runtime.queries import Query
 from deixis_runtime.settings import ConfigError
@@ -50,7 +52,7 @@ class RosCameraStage:
         self._seq = 0
         self._picture_s = node.monotonic_s()
         self._refused, self._refused_s = "", self._picture_s
-        self._next_s = 0.0
+        self._next_s = -math.inf
         self._info_due_s = 0.0
         node.serve_get(topics.CAMERA_INFO, self._answer)
 
@@ -120,7 +122,9 @@ class RosCameraStage:
         self._seq += 1
         self._picture_s = node.monotonic_s()
         if self._config.rate_hz is not None:
-            self._next_s = max(self._next_s + 1 / self._config.rate_hz, self._picture_s)
+            period_s = 1 / self._config.rate_hz
+            due_s = self._next_s if self._picture_s - self._next_s <= period_s else self._picture_s
+            self._next_s = due_s + period_s
 
     def _note_stamp(self, stamped: Stamped) -> None:
         text = f"{self._images.topic}: {stamped.complaint}; the time of arrival is used" if stamped.complaint else None

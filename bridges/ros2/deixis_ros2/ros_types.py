@@ -12,6 +12,7 @@ Distribution = Literal["humble", "jazzy", "kilted", "lyrical"]
 STORES: dict[Distribution, Stores] = {name: Stores(f"ros2_{name}") for name in get_args(Distribution)}
 NO_HASH = "TypeHashNotSupported"
 """What rmw_zenoh writes in a key where the distribution knows no hashes of types."""
+LAST_SECOND = 2**31 - 1
 OURS = ("deixis_msgs", "hri_msgs")
 
 
@@ -55,9 +56,9 @@ class RosTypes:
         return self.make("std_msgs/msg/Header", stamp=self.time(stamp_ns), frame_id=frame_id)
 
     def time(self, unix_ns: int) -> Any:
-        """builtin_interfaces/msg/Time."""
+        """builtin_interfaces/msg/Time, which ends in 2038: what is later becomes its last second."""
         seconds, nanoseconds = divmod(unix_ns, 1_000_000_000)
-        return self.make("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+        return self.make("builtin_interfaces/msg/Time", sec=min(seconds, LAST_SECOND), nanosec=nanoseconds)
 
 
 def stamp_ns(header: Any) -> int:
