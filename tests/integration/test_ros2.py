@@ -33,7 +33,7 @@ HEARD = {
     "/humans/bodies/p0/roi": REGION,
     "/tf": TRANSFORMS,
 }
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 LONGEST_ANSWER_S = 0.5
 UNDER_WAY = 3
 
