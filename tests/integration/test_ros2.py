@@ -149,11 +149,11 @@ def ros(tmp_path_factory):
 
 
 def test_ros_hears_what_was_pointed_at(ros):
-    def final():
-        return next((found for found in ros.messages("/deixis/pointed_target") if found[0].is_final), None)
+    def named():
+        final = [found for found in ros.messages("/deixis/pointed_target") if found[0].is_final]
+        return next((found for found in final if POINTED_AT in found[0].poi_ids), None)
 
-    message, attachment = ros.wait(final, "a final answer on ROS")
-    assert POINTED_AT in message.poi_ids, message.reason
+    message, attachment = ros.wait(named, f"a final answer on ROS that names {POINTED_AT}")
     assert message.person_id == "p0"
     assert message.header.frame_id == "map"
     assert 0 <= time.time_ns() - stamp_ns(message.header) < PATIENCE_S * 1e9
