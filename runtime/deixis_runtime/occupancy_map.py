@@ -26,6 +26,7 @@ MAX_LINES = 20_000
 LEAST_M = 0.3
 # An outline is drawn with as few lines as stay within this of it, or within a cell where cells are larger.
 WITHIN_M = 0.05
+UNKNOWN_SHADE = 205
 
 Mask = npt.NDArray[np.uint8]
 
@@ -52,15 +53,30 @@ def wall_lines(site: Site) -> list[WallLine]:
 
 def map_lines(path: Path) -> list[WallLine]:
     """The outlines of all that is occupied in a map, as lines. Raises SiteError with file, key and cause."""
-    try:
-        described = MapFile.model_validate(read_yaml(path, "map"))
-    except ValidationError as error:
-        raise SiteError(f"map {path}: {say(error)}") from None
-    picture = _picture(path, path.parent / described.image)
+    described, picture = read_map(path)
     lines = outlines(_occupied(picture, described), described)
     if len(lines) > MAX_LINES:
         raise SiteError(f"map {path}: its outlines have {len(lines)} lines, more than {MAX_LINES}: too ragged to see past")
     return lines
+
+
+def read_map(path: Path) -> tuple[MapFile, Picture]:
+    """What a map's YAML says, and its picture. Raises SiteError with file, key and cause."""
+    try:
+        described = MapFile.model_validate(read_yaml(path, "map"))
+    except ValidationError as error:
+        raise SiteError(f"map {path}: {say(error)}") from None
+    return described, _picture(path, path.parent / described.image)
+
+
+def shades(picture: Picture, described: MapFile) -> Mask:
+    """The map (h, w) as people know it, whatever way it is saved: free is light, occupied dark, the unknown grey between."""
+    values = np.arange(picture.most + 1) * (255 / picture.most)
+    if described.mode == "raw":
+        light = np.where(np.rint(values) <= 100, 255 - 2.55 * np.rint(values), UNKNOWN_SHADE)
+    else:
+        light = 255 - values if described.negate else values
+    return np.asarray(np.rint(light).clip(0, 255).astype(np.uint8)[picture.cells])
 
 
 def outlines(occupied: Mask, described: MapFile) -> list[WallLine]:
