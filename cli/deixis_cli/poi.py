@@ -7,15 +7,12 @@ import getpass
 import json
 import re
 import socket
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import zenoh
-from deixis_runtime.certificate_check import who_may_not_edit
-from deixis_runtime.certificates import certificates_of
 from deixis_runtime.poi_files import load_pois
 from deixis_runtime.session import open_client
 from deixis_runtime.settings import checked_name
@@ -24,11 +21,10 @@ from deixis_schemas import codec, topics
 from deixis_schemas.messages import Poi
 from deixis_schemas.plain_text import shown, steers
 
-from .gets import get_all, get_pois
+from . import poi_edit
 from .options import CommandError, add_connect, add_json, add_robot
+from .poi_registry import EditRefused, PoiRegistry
 
-DEADLINE_S = 5.0
-PAUSE_S = 0.1
 MAX_BY = 128
 # What msgpack needs besides a POI and its id.
 PACKED_EXTRA = 16
@@ -51,40 +47,42 @@ def register(subparsers: Any) -> None:
     what = "add or replace those of a file: a site file, a YAML or JSON list, CSV, or GeoJSON in metres of the map"
     many = _action(actions, "import", what, run_import)
     many.add_argument("file", type=Path, metavar="FILE")
-    for edit in (add, move, remove, many):
+    page = actions.add_parser("edit", help="place them on the map in a page", description=poi_edit.__doc__)
+    poi_edit.add_options(page)
+    for edit in (add, move, remove, many, page):
         edit.add_argument("--by", type=_plain, default=who(), metavar="NAME", help="who edits (default: %(default)s)")
 
 
 def run_list(given: argparse.Namespace) -> int:
     """Show all POIs."""
-    with open_client(given.connect, shared_memory=False) as session:
-        _show(_pois(session, given), given)
+    with _registry(given) as registry:
+        _show(registry.pois(), given)
     return 0
 
 
 def run_add(given: argparse.Namespace) -> int:
     """Add or replace one POI."""
     poi = _checked(poi_id=given.poi_id, name=given.name, position_m=_position(given), extent_m=given.extent, tags=given.tag)
-    with open_client(given.connect, shared_memory=False) as session:
-        _show([_edit(session, given, poi.poi_id, poi)], given)
+    with _registry(given) as registry:
+        _show(_acknowledged(poi.poi_id, lambda: registry.put(poi)), given)
     return 0
 
 
 def run_move(given: argparse.Namespace) -> int:
     """Give one POI another position."""
-    with open_client(given.connect, shared_memory=False) as session:
-        found = _pois(session, given, given.poi_id)
+    with _registry(given) as registry:
+        found = registry.pois(given.poi_id)
         if not found:
             raise CommandError(f"poi_id: there is no POI '{given.poi_id}'; use 'deixis poi add'")
         poi = _checked(**{**found[0].model_dump(), "position_m": _position(given)})
-        _show([_edit(session, given, poi.poi_id, poi)], given)
+        _show(_acknowledged(poi.poi_id, lambda: registry.put(poi)), given)
     return 0
 
 
 def run_remove(given: argparse.Namespace) -> int:
     """Remove one POI; shows it as it was."""
-    with open_client(given.connect, shared_memory=False) as session:
-        _show([_edit(session, given, given.poi_id, None)], given)
+    with _registry(given) as registry:
+        _show(_acknowledged(given.poi_id, lambda: registry.delete(given.poi_id)), given)
     return 0
 
 
@@ -96,10 +94,10 @@ def run_import(given: argparse.Namespace) -> int:
         raise CommandError(str(error)) from None
     if not pois:
         raise CommandError(f"{given.file}: holds no POIs")
-    with open_client(given.connect, shared_memory=False) as session:
+    with _registry(given) as registry:
         stored: list[Poi] = []
         for part in _parts(pois):
-            stored += _put_all(session, given, part, len(stored))
+            stored += _put_all(registry, part, len(stored))
         _show(stored, given)
     return 0
 
@@ -119,60 +117,27 @@ def _parts(pois: Sequence[Poi]) -> Iterator[dict[str, Any]]:
     yield part
 
 
-def _put_all(session: zenoh.Session, given: argparse.Namespace, pois: dict[str, Any], done: int) -> list[Poi]:
-    """Put POIs as one edit, of which all are stored or none; `done` of the file are. Raises CommandError."""
-    selector = f"{topics.POI.key(given.robot, id='*')}?op=put_all;by={given.by}"
-    payload = codec.pack(pois)
-    stored, refused = _answered(session, given, selector, payload)
-    if refused:
+def _put_all(registry: PoiRegistry, pois: dict[str, Any], done: int) -> list[Poi]:
+    """Put POIs as one edit; `done` of the file are stored. Raises CommandError."""
+    try:
+        return registry.put_all(pois)
+    except EditRefused as error:
         before = f"{done} POIs are stored, none after them: " if done else ""
-        raise CommandError(f"{before}{refused}")
-    return stored
+        raise CommandError(f"{before}{error}") from None
 
 
-def _edit(session: zenoh.Session, given: argparse.Namespace, which: str, poi: Poi | None) -> Poi:
-    """Put a POI, or delete it where `poi` is none, and wait for the stored one. Raises CommandError."""
-    selector = f"{topics.POI.key(given.robot, id=which)}?op={'delete' if poi is None else 'put'};by={given.by}"
-    stored, refused = _answered(session, given, selector, codec.encode(poi) if poi is not None else None)
-    if refused:
-        raise CommandError(f"{which}: {refused}")
-    return stored[0]
+def _acknowledged(poi_id: str, edit: Callable[[], Poi]) -> list[Poi]:
+    """What an edit of one POI stored. Raises CommandError, a refusal with the POI's id."""
+    try:
+        return [edit()]
+    except EditRefused as error:
+        raise CommandError(f"{poi_id}: {error}") from None
 
 
-def _answered(
-    session: zenoh.Session, given: argparse.Namespace, selector: str, payload: bytes | None
-) -> tuple[list[Poi], str | None]:
-    """What an edit stored, or why it is refused. Raises CommandError where fusion does not answer."""
-    encoding = codec.encoding_of(Poi) if payload is not None else None
-    deadline_s = time.monotonic() + DEADLINE_S
-    while True:
-        stored, refused = get_all(session, selector, Poi, payload=payload, encoding=encoding, timeout_s=DEADLINE_S)
-        if refused:
-            return [], refused[0].reason
-        if stored:
-            return [poi for _, poi in stored], None
-        # A get made just as fusion comes up or restarts comes back empty.
-        if time.monotonic() > deadline_s:
-            raise CommandError(_nobody(given))
-        time.sleep(PAUSE_S)
-
-
-def _pois(session: zenoh.Session, given: argparse.Namespace, which: str = "**") -> list[Poi]:
-    """All POIs, or the one of this id. Raises CommandError where fusion does not answer."""
-    deadline_s = time.monotonic() + DEADLINE_S
-    while (found := get_pois(session, given.robot, which)) is None:
-        if time.monotonic() > deadline_s:
-            raise CommandError(_nobody(given))
-        time.sleep(PAUSE_S)
-    return found
-
-
-def _nobody(given: argparse.Namespace) -> str:
-    # Access control denies without a word.
-    ours = who_may_not_edit(certificates_of())
-    if ours is not None:
-        return f"fusion of robot '{given.robot}' does not answer at {given.connect}: the certificate {ours} is not an editor's"
-    return f"fusion of robot '{given.robot}' does not answer at {given.connect}; 'deixis doctor' tells why"
+@contextmanager
+def _registry(given: argparse.Namespace) -> Iterator[PoiRegistry]:
+    with open_client(given.connect, shared_memory=False) as session:
+        yield PoiRegistry(session, given.robot, given.connect, getattr(given, "by", ""))
 
 
 def _checked(**content: Any) -> Poi:
