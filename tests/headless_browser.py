@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import json
 import os
 import select
@@ -99,17 +100,20 @@ def page(folder: Path, size: tuple[int, int], *flags: str) -> Iterator[Page]:
     """A browser with one page of this size; its profile lies in `folder`."""
     to_child, to = os.pipe()
     from_, from_child = os.pipe()
+    # Out of the way of 3 and 4, which the browser reads and writes. A shell lays them there: what Python runs between fork and
+    # exec is unsafe with threads.
+    ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 100) for end in (to_child, from_child)]
+    os.close(to_child)
+    os.close(from_child)
 
-    # The browser reads 3 and writes 4. A shell lays them there: what Python runs between fork and exec is unsafe with threads.
-    shell = f'exec "$@" 3<&{to_child} 4>&{from_child}'
     argv = [CHROMIUM, *FLAGS, f"--window-size={size[0]},{size[1]}", f"--user-data-dir={folder / 'profile'}", *flags]
     with (folder / "browser.log").open("ab") as log:
         child = subprocess.Popen(
-            ["sh", "-c", shell, "sh", *argv],
-            stdin=subprocess.DEVNULL, stdout=log, stderr=log, pass_fds=(to_child, from_child), start_new_session=True,
+            ["bash", "-c", f'exec "$@" 3<&{ends[0]} 4>&{ends[1]}', "bash", *argv],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, pass_fds=ends, start_new_session=True,
         )  # fmt: skip
-    os.close(to_child)
-    os.close(from_child)
+    for end in ends:
+        os.close(end)
     try:
         yield Page(to, from_)
     finally:

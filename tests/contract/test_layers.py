@@ -1,4 +1,4 @@
-"""Arrows point down: cli, conformance, view, evaluation, simulation -> services -> runtime -> schemas; no service imports another."""
+"""Arrows point down: cli, conformance, view, evaluation, simulation -> services -> runtime -> schemas; not between services."""
 
 import ast
 from pathlib import Path

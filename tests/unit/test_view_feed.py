@@ -1,6 +1,5 @@
 """Between who hears and who draws: who draws slowly, or not at all, holds nobody up and fills no memory."""
 
-import threading
 import time
 import tracemalloc
 
@@ -11,28 +10,11 @@ from deixis_view.drawer import Drawer, Painter
 from deixis_view.feed import MAX_OTHERS, MAX_PICTURE_BYTES, MAX_PICTURES, Feed
 from deixis_view.known import Known
 from deixis_view.scene import Scene
+from stuck_viewer import StuckSink
 
 FRAME_KEY = topics.FRAME.key("r1")
 TRACKS_KEY = topics.TRACKS.key("r1")
 VGA_BYTES = 640 * 480 * 3
-
-
-class StuckSink:
-    """A viewer that takes the first shot and never returns, until it is let go."""
-
-    def __init__(self):
-        self.entered = threading.Event()
-        self.let_go = threading.Event()
-        self.drawn = 0
-
-    def lay_out(self, layout):
-        self.layout = layout
-
-    def draw(self, _shot):
-        self.entered.set()
-        self.let_go.wait(30)
-        self.drawn += 1
-        return True
 
 
 def raw(key, payload=b"", number=0):

@@ -124,7 +124,7 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
     if given.out is not None:
         yield None, sink_for_file(given.out, name=name)
         return
-    sink = new_sink(name)
+    sink = new_sink(name, live=given.file is None)
     with ExitStack() as stack:
         viewer = stack.enter_context(ViewerProcess(window=not given.web))
         if given.web:
@@ -139,8 +139,9 @@ def _recorded(given: argparse.Namespace, painter: Painter, show: Showing) -> Non
         count = paint_all(messages(given.file, given.pictures), painter.take, show.stopped)
     if not count:
         raise CommandError(f"'{given.file}' holds no message")
+    print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
     if given.out is not None:
-        print(f"{given.out}: {painter.shots} times drawn; 'rerun {given.out}' shows it", file=sys.stderr)
+        print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
     else:
         show.stay()
 

@@ -17,20 +17,20 @@ MISSING = (
 )
 
 
-def new_sink(name: str) -> RerunSink:
-    """A sink whose recording has this name. Raises CommandError where Rerun is not installed."""
+def new_sink(name: str, *, live: bool) -> RerunSink:
+    """A sink whose recording has this name. live: it leaves out what a viewer does not take at once. Raises CommandError where Rerun is not installed."""
     if find_spec("rerun") is None:
         raise CommandError(MISSING)
     from .rerun_sink import RerunSink  # noqa: PLC0415 - it takes a second, and is not there everywhere
 
-    return RerunSink(name=name)
+    return RerunSink(name=name, live=live)
 
 
 def sink_for_file(path: Path, *, name: str) -> RerunSink:
     """A sink to a file, which is begun anew. Raises CommandError where that cannot be, or where the name says another kind."""
     if path.suffix != SUFFIX:
         raise CommandError(f"'{path}': what is drawn goes to a file of Rerun's, whose name ends in {SUFFIX}")
-    sink = new_sink(name)
+    sink = new_sink(name, live=False)
     try:
         return sink.to_file(path)
     except OSError as error:

@@ -39,6 +39,11 @@ class ViewerProcess:
         self._child: subprocess.Popen[bytes]
 
     @property
+    def pid(self) -> int:
+        """Of the process that was started, and of its group."""
+        return self._child.pid
+
+    @property
     def url(self) -> str:
         """Where what is drawn goes, and whence the page has it."""
         return f"rerun+http://{LOOPBACK}:{self.port}/proxy"
