@@ -71,14 +71,16 @@ def run(given: argparse.Namespace) -> int:
     try:
         with ExitStack() as stack:
             interrupts = stack.enter_context(Interrupts())
+            # First: where nothing can be reached, no window opens and no file is begun.
+            session = stack.enter_context(open_client(given.connect, shared_memory=False)) if given.file is None else None
             viewer, sink = stack.enter_context(_sink(given))
             scene = scene_of(known, draw_options(given), live=given.file is None)
             painter = Painter(scene, sink)
             show = Showing(viewer, interrupts, until_s)
-            if given.file is not None:
+            if session is None:
                 _recorded(given, painter, show)
             else:
-                _live(given, scene, painter, show)
+                _live(given, session, scene, painter, show)
             if not sink.close() and given.out is not None:
                 raise CommandError(f"'{given.out}' could not be written to its end")
     except (ViewerError, McapFileError) as error:
@@ -146,20 +148,19 @@ def _recorded(given: argparse.Namespace, painter: Painter, show: Showing) -> Non
         show.stay()
 
 
-def _live(given: argparse.Namespace, scene: Scene, painter: Painter, show: Showing) -> None:
-    """Draw what runs. Raises Unreachable, ViewerError."""
+def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, painter: Painter, show: Showing) -> None:
+    """Draw what runs. Raises ViewerError, and CommandError where drawing fails."""
     feed = Feed()
-    with open_client(given.connect, shared_memory=False) as session:
-        _ask(session, given.robot, scene)
-        with Drawer(feed, painter, END_S) as drawer, hear(session, keys_of(given.robot, pictures=not given.no_pictures), feed):
-            teller = _Teller(given, scene)
-            asked_s = 0.0
-            while not show.stopped() and not drawer.failure:
-                time.sleep(TURN_S)
-                teller.tell()
-                if time.monotonic() - asked_s > ASK_CLOCK_EVERY_S:
-                    asked_s = time.monotonic()
-                    _compare_clocks(session, given.robot, scene)
+    _ask(session, given.robot, scene)
+    with Drawer(feed, painter, END_S) as drawer, hear(session, keys_of(given.robot, pictures=not given.no_pictures), feed):
+        teller = _Teller(given, scene, session)
+        asked_s = 0.0
+        while not show.stopped() and not drawer.failure:
+            time.sleep(TURN_S)
+            teller.tell()
+            if time.monotonic() - asked_s > ASK_CLOCK_EVERY_S:
+                asked_s = time.monotonic()
+                _compare_clocks(session, given.robot, scene)
     if drawer.failure:
         raise CommandError(f"drawing has failed: {drawer.failure}")
 
@@ -167,13 +168,19 @@ def _live(given: argparse.Namespace, scene: Scene, painter: Painter, show: Showi
 class _Teller:
     """Says on standard error what is missing, once."""
 
-    def __init__(self, given: argparse.Namespace, scene: Scene) -> None:
-        self._given, self._scene = given, scene
+    def __init__(self, given: argparse.Namespace, scene: Scene, session: zenoh.Session) -> None:
+        self._given, self._scene, self._session = given, scene, session
+        self._linked = True
         self._since_s = time.monotonic()
         self._told: set[str] = set()
 
     def tell(self) -> None:
-        """Say what is missing, once it has been for a while."""
+        """Say what is missing, once it has been for a while; and each time that the router is gone or back."""
+        if bool(self._session.info.routers_zid()) != self._linked:
+            self._linked = not self._linked
+            print(
+                f"deixis view: the router is {'back' if self._linked else 'gone; waiting for it'}", file=sys.stderr, flush=True
+            )
         if time.monotonic() - self._since_s < SILENT_S:
             return
         if not self._scene.heard_anything:

@@ -106,17 +106,19 @@ class Drawer:
 
     def _run(self) -> None:
         try:
-            while not self._stop.is_set():
-                self._turn(TURN_S)
-            self._turn(0.0)
+            while self._turn(0.0 if self._stop.is_set() else TURN_S) or not self._stop.is_set():
+                pass
         except Exception as error:  # a thread that dies must not look like a viewer that has nothing to show
             self.failure = f"{type(error).__name__}: {error}"
             log.exception("drawing has failed")
 
-    def _turn(self, timeout_s: float) -> None:
-        for raw in self._feed.take(timeout_s):
+    def _turn(self, timeout_s: float) -> bool:
+        """Draw one message, or what is due without one; whether there was one."""
+        raw = self._feed.take(timeout_s)
+        if raw is not None:
             self._painter.take(raw)
         self._painter.tick(self._clock_ns())
+        return raw is not None
 
 
 def read(topic: Topic, raw: RawMessage) -> Message:

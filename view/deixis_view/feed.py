@@ -32,35 +32,40 @@ class Feed:
         with self._lock:
             self._order += 1
             self.left_out += queue.put(self._order, message)
-        self._event.set()
+            self._event.set()
 
-    def take(self, timeout_s: float) -> list[RawMessage]:
-        """What has come since the last call, in its order; waits for something, at most `timeout_s`."""
-        self._event.wait(timeout_s)
-        self._event.clear()
+    def take(self, timeout_s: float) -> RawMessage | None:
+        """The oldest message, which is then held no more; none where none comes within `timeout_s`."""
+        message = self._pop()
+        if message is None and timeout_s > 0:
+            self._event.wait(timeout_s)
+            message = self._pop()
+        return message
+
+    def _pop(self) -> RawMessage | None:
         with self._lock:
-            held = [*self._pictures.take(), *self._others.take()]
-        return [message for _, message in sorted(held, key=lambda item: item[0])]
+            self._event.clear()
+            queues = [queue for queue in (self._pictures, self._others) if queue.held]
+            return min(queues, key=lambda queue: queue.held[0][0]).pop() if queues else None
 
 
 class _Queue:
     def __init__(self, most: int, most_bytes: int) -> None:
+        self.held: deque[tuple[int, RawMessage]] = deque()
         self._most, self._most_bytes = most, most_bytes
-        self._held: deque[tuple[int, RawMessage]] = deque()
         self._bytes = 0
 
     def put(self, order: int, message: RawMessage) -> int:
         """Keep it, and give up the oldest past the bounds: how many those are."""
-        self._held.append((order, message))
+        self.held.append((order, message))
         self._bytes += len(message.payload)
         given_up = 0
-        while len(self._held) > 1 and (len(self._held) > self._most or self._bytes > self._most_bytes):
-            self._bytes -= len(self._held.popleft()[1].payload)
+        while len(self.held) > 1 and (len(self.held) > self._most or self._bytes > self._most_bytes):
+            self.pop()
             given_up += 1
         return given_up
 
-    def take(self) -> list[tuple[int, RawMessage]]:
-        held = list(self._held)
-        self._held.clear()
-        self._bytes = 0
-        return held
+    def pop(self) -> RawMessage:
+        message = self.held.popleft()[1]
+        self._bytes -= len(message.payload)
+        return message

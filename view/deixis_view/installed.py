@@ -18,7 +18,10 @@ MISSING = (
 
 
 def new_sink(name: str, *, live: bool) -> RerunSink:
-    """A sink whose recording has this name. live: it leaves out what a viewer does not take at once. Raises CommandError where Rerun is not installed."""
+    """A sink whose recording has this name. live: it leaves out what a viewer does not take at once.
+
+    Raises CommandError where Rerun is not installed.
+    """
     if find_spec("rerun") is None:
         raise CommandError(MISSING)
     from .rerun_sink import RerunSink  # noqa: PLC0415 - it takes a second, and is not there everywhere

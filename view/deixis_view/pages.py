@@ -23,7 +23,7 @@ def reason_page(view: FrameView, known: Known, no_pictures: str) -> str:
     parts += ["\n".join(_table(("stage", "sees"), seen))] if seen else []
     evidence = [item for person in (view.belief.persons if view.belief else []) for item in person.evidence]
     if evidence:
-        parts.append("\n".join(_table(("evidence", "observed", "weight"), map(_evidence, evidence))))
+        parts.append("\n".join(_table(("evidence", "weight", "observed"), map(_evidence, evidence))))
     if no_pictures:
         parts.append(f"*No pictures: {no_pictures}*")
     return "\n\n".join(parts)
@@ -72,7 +72,8 @@ def _seen(view: FrameView, known: Known) -> Iterable[tuple[str, ...]]:
 
 
 def _evidence(item: Evidence) -> tuple[str, ...]:
-    return item.source, item.observed if item.status == "ok" else f"{item.status}: {item.observed}", f"{item.weight:.2f}"
+    observed = item.observed if item.status == "ok" else f"{item.status}: {item.observed}"
+    return item.source, f"{item.weight:.2f}", observed
 
 
 def _health_row(health: Health, known: Known, now_ns: int) -> tuple[str, ...]:

@@ -109,9 +109,12 @@ class Scene:
         if self._unwanted:
             return self._unwanted
         quiet_ns = now_ns - (self._frame_ns or self._began_ns or now_ns)
-        if quiet_ns > NO_FRAMES_NS:
-            return WITHHELD if self._live else UNRECORDED
-        return self.unreadable
+        if quiet_ns <= NO_FRAMES_NS:
+            return self.unreadable
+        if not self._live:
+            return UNRECORDED
+        camera = self.known.camera
+        return f"the camera is {camera.state}" if camera is not None and camera.state != "streaming" else WITHHELD
 
     def _frame_shot(self, view: FrameView, now_ns: int) -> Shot:
         self._view, self._view_ns, self._drawn_ns = view, now_ns, now_ns
