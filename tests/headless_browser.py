@@ -31,10 +31,10 @@ ANSWER_S = 90.0
 
 
 class Page:
-    """One page of a browser. hosts: `host:port` of all that the page asked for anything; said: what it wrote to its console."""
+    """One page of a browser. said: what it wrote to its console."""
 
     def __init__(self, to: int, from_: int) -> None:
-        self.hosts: set[str] = set()
+        self._asked: dict[str, str] = {}
         self.said: list[str] = []
         self._to, self._from = to, from_
         self._number = 0
@@ -44,6 +44,11 @@ class Page:
         self._session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Network", "Page", "Log", "Runtime"):
             self._ask(f"{domain}.enable")
+
+    @property
+    def hosts(self) -> set[str]:
+        """`host:port` of all that the page has asked for anything."""
+        return set(self._asked.values())
 
     def open(self, url: str) -> None:
         """Go there."""
@@ -88,7 +93,9 @@ class Page:
 
     def _note(self, method: str | None, params: dict[str, Any]) -> None:
         if method == "Network.requestWillBeSent" and params["request"]["url"].startswith("http"):
-            self.hosts.add(urlsplit(params["request"]["url"]).netloc)
+            self._asked[params["requestId"]] = urlsplit(params["request"]["url"]).netloc
+        elif method == "Network.loadingFailed" and params.get("blockedReason") == "csp":
+            self._asked.pop(params["requestId"], None)  # the browser did not let it go out
         elif method == "Log.entryAdded":
             self.said.append(params["entry"]["text"])
         elif method == "Runtime.consoleAPICalled":

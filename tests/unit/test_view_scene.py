@@ -161,7 +161,7 @@ def test_the_answer_is_named_in_words_with_its_reason_and_kept_in_the_log():
     assert at(play(scene, [9])[0], "map/named").strips
 
 
-def test_pois_come_and_go_and_a_thousand_have_no_more_curves_than_can_be_told_apart():
+def test_pois_come_and_go_and_a_thousand_have_no_more_curves_than_can_be_looked_at():
     known = Known()
     key = topics.POI.key("r1", id="vase")
     known.hear(key, Poi(poi_id="vase", position_m=(1, 1, 1)), 0)
@@ -170,6 +170,18 @@ def test_pois_come_and_go_and_a_thousand_have_no_more_curves_than_can_be_told_ap
     assert known.names == {}
     curves = Curves()
     pois = [standing(f"p{i}", 0.9) for i in range(1000)]
-    belief = made(Belief, 0, "fusion", persons=[{"person_id": p, "pois": pois} for p in range(3)])
+    belief = made(Belief, 0, "fusion", persons=[{"person_id": p, "pois": pois[:10]} for p in range(3)])
     named = [drawing for _ in range(2) for drawing in curves.of_belief(belief, {}) if isinstance(drawing.what, CurveStyle)]
-    assert len([drawing for drawing in named if drawing.path.startswith("belief/")]) == MOST_CURVES
+    assert len([drawing for drawing in named if drawing.path.startswith("belief/")]) == 30
+    belief = made(Belief, 0, "fusion", persons=[{"person_id": 0, "pois": pois}])
+    list(curves.of_belief(belief, {}))
+    assert len(curves._of_pois) == MOST_CURVES
+
+
+def test_visitors_who_come_all_day_share_the_curves_of_their_places():
+    curves, drawn = Curves(), set()
+    for visitor in range(100):
+        # Each meets the one before, who then leaves.
+        persons = [{"person_id": p, "pois": [standing("vase", 0.9)]} for p in (visitor, visitor + 1)]
+        drawn |= {drawing.path for drawing in curves.of_belief(made(Belief, visitor, "fusion", persons=persons), {})}
+    assert {path for path in drawn if path.startswith("belief/")} == {"belief/0/vase", "belief/1/vase"}

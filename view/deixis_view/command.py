@@ -149,7 +149,7 @@ def _recorded(given: argparse.Namespace, painter: Painter, show: Showing) -> Non
 
 
 def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, painter: Painter, show: Showing) -> None:
-    """Draw what runs. Raises ViewerError, and CommandError where drawing fails."""
+    """Draw what runs. Raises ViewerError, and CommandError where drawing fails or nothing was heard."""
     feed = Feed()
     _ask(session, given.robot, scene)
     with Drawer(feed, painter, END_S) as drawer, hear(session, keys_of(given.robot, pictures=not given.no_pictures), feed):
@@ -163,6 +163,8 @@ def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, paint
                 _compare_clocks(session, given.robot, scene)
     if drawer.failure:
         raise CommandError(f"drawing has failed: {drawer.failure}")
+    if not scene.heard_anything:
+        raise CommandError(f"nothing was heard of robot '{given.robot}' at {given.connect}; see 'deixis doctor'")
 
 
 class _Teller:

@@ -53,7 +53,8 @@ class _ClipPictures:
             )
         frame = Frame.model_validate(
             {
-                **{"run": tracks.run, "seq": tracks.seq, "stamp_ns": tracks.stamp_ns, "stage": topics.FRAME.stage},
+                # No stage's name: when the camera said it is not known, and so no delay of its is drawn.
+                **{"run": tracks.run, "seq": tracks.seq, "stamp_ns": tracks.stamp_ns, "stage": "clip"},
                 **{"instance": "clip", "width": width, "height": height, "encoding": "bgr8", "data": image.tobytes()},
             }
         )
