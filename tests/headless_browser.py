@@ -25,9 +25,9 @@ needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromi
 FLAGS = (
     *("--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions"),
-    *("--disable-dev-shm-usage", "--remote-debugging-pipe", "--hide-scrollbars"),
+    *("--remote-debugging-pipe", "--hide-scrollbars"),
 )
-ANSWER_S = 90.0
+ANSWER_S = 120.0
 
 
 class Page:

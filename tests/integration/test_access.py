@@ -134,7 +134,7 @@ def test_who_hears_what(site, stages, who, readable):
 def test_a_viewer_is_shown_all_but_the_picture_and_told_so(site, stages, tmp_path):
     out, log = tmp_path / "out.rrd", tmp_path / "log"
     argv = command(
-        "deixis", "view", "--robot", ROBOT, "--connect", site.edge, "--certs", site.certs["viewer:anna"], "--out", out
+        "deixis", "view", "--robot", ROBOT, "--connect", site.edge, "--certs", site.certs["viewer:anna"].folder, "--out", out
     )
     samples = {type(message).__name__: message for message in SAMPLES}
     with process(argv, log) as child:
