@@ -4,12 +4,16 @@ SOURCE ?=
 SITE ?=
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
+LINEUP ?= classic
 BIN := .venv/bin
 DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
+# Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
+MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
+GUESTS := .venv/guests/mediapipe
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract references zenohd clean
+.PHONY: setup guests demo test check bench contract references zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -22,14 +26,30 @@ setup: .venv/.installed
 	@$(PIP) --no-build-isolation $(foreach d,$(DISTRIBUTIONS),-e $(d))
 	@touch $@
 
+# Stages made with MediaPipe, in an environment of their own within .venv (430 MB). Their libraries are installed as listed, see
+# guests/constraints.txt; the last line holds that they load.
+guests: setup $(GUESTS)/.installed
+
+$(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests/%/pyproject.toml,$(MEDIAPIPE))
+	@echo "setting up the guests on MediaPipe (about a minute) ..."
+	@$(PYTHON) -m venv $(GUESTS)
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r guests/constraints.txt
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt hatchling editables
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-build-isolation -e schemas -e runtime
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		$(patsubst %,-e guests/%,$(MEDIAPIPE))
+	@$(GUESTS)/bin/python -c "from mediapipe.solutions import face_detection, face_mesh, hands"
+	@touch $@
+
 # The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]
-demo: setup
+# With guests in the place of our stages: make demo LINEUP=mediapipe
+demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
-		--registry $$registry --expect P3; status=$$?; rm -f $$registry*; exit $$status
+		--registry $$registry --expect P3 --lineup "$(LINEUP)"; status=$$?; rm -f $$registry*; exit $$status
 else
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
-	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run "$$@"
+	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run --lineup "$(LINEUP)" "$$@"
 endif
 
 test: setup check
@@ -37,7 +57,7 @@ test: setup check
 	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES) $(foreach g,$(MEDIAPIPE),guests/$(g)/deixis_$(g))
 	@for tools in bench fitting; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup
