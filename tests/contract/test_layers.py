@@ -19,6 +19,7 @@ MAY_IMPORT = {
     "deixis_view": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
     "deixis_conformance": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
+    **{f"deixis_{name}_mediapipe": {"deixis_schemas", "deixis_runtime"} for name in ("tracker", "headpose", "gesture")},
     "deixis_simulation": {
         *("deixis_schemas", "deixis_runtime", "deixis_cli"),
         # A rehearsal plays a site's clips and scores the answers, and says what the stages' settings allow.
