@@ -29,7 +29,7 @@ from rich.console import Console
 from .drawer import Drawer, Painter
 from .feed import Feed
 from .hearing import hear, keys_of
-from .installed import new_sink, sink_for_file
+from .installed import check_installed, new_sink, sink_for_file
 from .options import add_draw_options, draw_options, known_place, scene_of
 from .recording import messages, paint_all
 from .scene import Scene
@@ -117,6 +117,7 @@ def _check(given: argparse.Namespace) -> None:
         raise CommandError("--pictures CLIP goes with a recording")
     if not given.web and given.out is None and not has_display():
         raise CommandError(NO_DISPLAY)
+    check_installed()
 
 
 @contextmanager

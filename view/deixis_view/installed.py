@@ -17,13 +17,18 @@ MISSING = (
 )
 
 
+def check_installed() -> None:
+    """Raises CommandError where Rerun is not installed."""
+    if find_spec("rerun") is None:
+        raise CommandError(MISSING)
+
+
 def new_sink(name: str, *, live: bool) -> RerunSink:
     """A sink whose recording has this name. live: it leaves out what a viewer does not take at once.
 
     Raises CommandError where Rerun is not installed.
     """
-    if find_spec("rerun") is None:
-        raise CommandError(MISSING)
+    check_installed()
     from .rerun_sink import RerunSink  # noqa: PLC0415 - it takes a second, and is not there everywhere
 
     return RerunSink(name=name, live=live)
