@@ -3,16 +3,16 @@
 usage: python bench/swap.py [--rounds N] [--stages NAMES] [--lockstep] [--rate HZ] [--source FILE] [--site FILE] [--json FILE]
 
 Runs `deixis up` on the looped example, and has its supervisor replace tracker, headpose and gesture in turn, N times, as
-`deixis swap` does; headpose is replaced by examples/swap_headpose.py as well (`headpose_guest`), whose end gives the place back.
+`deixis swap` does; headpose is replaced by examples/swap_headpose.py, too (`headpose_guest`), whose end gives the place back.
 Of each STAGE:
-* STAGE_gap_frames_p50, _max: frames that came between the last answer of the old one and the first of the new one and that neither
-  answered. The tracker is given each frame of the camera, headpose and gesture each message of the tracker.
+* STAGE_gap_frames_p50, _max: frames that came between the last answer of the old one and the first of the new one, answered by
+  neither. The tracker is given each frame of the camera, headpose and gesture each message of the tracker.
 * STAGE_gap_ms_p50, _max: from the one answer to the other; STAGE_usual_ms_p50: from one answer to the next, else.
 * STAGE_twice: frames answered twice, over all rounds. Has to be 0, or the exit is 1.
 * STAGE_unanswered_per_1000: of the frames that came while we listened; what a busy machine leaves out is in it.
-* STAGE_takes_s_p50: from the command to the end of the old one; for WATCH_S of it the newcomer is only watched.
+* STAGE_takes_s_p50: from the command to the end of the old one; for WATCH_S the newcomer is watched.
 * two_voices: lines in which a stage said that a key has more than one producer. Has to be 0, or the exit is 1.
-Live, a busy machine leaves out frames, and its figures say little of the swap: --lockstep leaves out none, --rate lowers the load.
+Live, a busy machine leaves out frames, and its figures say little of a swap; --lockstep leaves out none, --rate asks for less.
 """
 
 from __future__ import annotations

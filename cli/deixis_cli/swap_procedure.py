@@ -21,8 +21,8 @@ from .system import alive_processes
 
 START_WITHIN_S = 60.0
 EXAM_WITHIN_S = 15.0
-TAKE_WITHIN_S = 5.0
-"""From the order on: two such times as the newcomer gives the old one to answer."""
+TAKE_WITHIN_S = 10.0
+"""From the order on, of which the newcomer gives the old one a second and a half to answer."""
 HEARD_WITHIN_S = 20.0
 """Until the newcomer's first answer: in lockstep, on a machine that is busy, frames come slowly."""
 MUTE_WITHIN_S = 120.0
@@ -87,6 +87,7 @@ class SwapProcedure:
         self._input = input_of_stage(stage)
         self._given = Ear(session, self._input.key(robot))
         self._ear = Ear(session, self._topic.key(robot))
+        self._count = SwapCount("", "")
         self._aside = Ear(session, topics.standby_key(self._topic, robot))
 
     def incumbent(self) -> str:
@@ -134,13 +135,12 @@ class SwapProcedure:
     def examine(self, old: str, new: str, newcomer: Newcomer) -> None:
         """Look at what the newcomer says aside, beside the old one's answers."""
         exam = StandbyExam(self._topic, new)
-        self._ear.take()
+        self._count = SwapCount(old, new)
         until_s = time.monotonic() + EXAM_WITHIN_S
         while not exam.enough() and time.monotonic() < until_s:
             self._pause(newcomer, TURN_S)
-            for _, payload, encoding in self._ear.take():
-                message = self._read(self._topic, payload, encoding)
-                if message is not None and message.instance == old:
+            for message in self._listen():
+                if message.instance == old:
                     exam.hear_old(message)
             for _, payload, encoding in self._aside.take():
                 exam.hear_new(payload, encoding)
@@ -148,48 +148,51 @@ class SwapProcedure:
             raise Refusal(f"{old} keeps the place, for {new} is not fit for it: {verdict}")
 
     def hand_over(self, old: str, new: str, newcomer: Newcomer, watch_s: float) -> Cost:
-        """Order the newcomer to take the place, watch it so long, and end the old one. What that has cost."""
-        count = SwapCount(old, new)
-        self._given.take()
-        self._ear.take()
-        self._order(old, new, newcomer, count)
+        """Order the newcomer that was examined to take the place, watch it so long, and end the old one. What that has cost."""
+        self._order(old, new, newcomer)
         mute = f"{new} has the place and answers no frame; {old} stands by and takes it back when {new} is stopped"
-        self._await(lambda: self._count(count).answers_of_new(), newcomer, HEARD_WITHIN_S, mute)
+        self._await(self._is_heard, newcomer, HEARD_WITHIN_S, mute)
         until_s = time.monotonic() + watch_s
         while time.monotonic() < until_s:
             self._pause(newcomer, LOOK_S)
-            self._count(count)
+            self._listen()
             if new not in self.heard_now():
                 raise Refusal(f"{new} took the place and is gone; heard now: {', '.join(self.heard_now()) or 'nobody'}")
         self._dismiss(old, newcomer)
-        self._count(count)
-        cost = count.cost()
+        self._listen()
+        cost = self._count.cost()
         if cost is None:
             raise Refusal(f"{old} was not heard before {new}: what the swap has cost is not known")
         return cost
 
-    def _order(self, old: str, new: str, newcomer: Newcomer, count: SwapCount) -> None:
-        key = topics.VOICE.key(self._robot, stage=self._stage, id=new)
-        told, why = self._ask(f"{key}?op=take;from={old}", TAKE_WITHIN_S)
-        until_s = time.monotonic() + TAKE_WITHIN_S
-        while told is not None and told.state == "asks" and time.monotonic() < until_s:
-            self._pause(newcomer, TURN_S)
-            self._count(count)
-            told, why = self._ask(key)
-        if told is not None and told.state == "speaks":
-            return
-        said = why if told is None else told.reason
-        if f"{old} has not answered" in said:
-            self._await_end_of_mute(old, new, newcomer, count)
-            return
-        raise Refusal(f"{old} keeps the place: {said or f'{new} does not answer'}")
+    def _is_heard(self) -> bool:
+        """Whether the newcomer has answered a frame aloud."""
+        self._listen()
+        return self._count.answers_of_new() > 0
 
-    def _await_end_of_mute(self, old: str, new: str, newcomer: Newcomer, count: SwapCount) -> None:
+    def _order(self, old: str, new: str, newcomer: Newcomer) -> None:
+        key = topics.VOICE.key(self._robot, stage=self._stage, id=new)
+        until_s = time.monotonic() + TAKE_WITHIN_S
+        told, said = self._ask(f"{key}?op=take;from={old}")
+        # Silence is no answer: on a machine that is busy one may come late, and the next tells how it stands then.
+        while not said and time.monotonic() < until_s:
+            if told is not None and told.state == "speaks":
+                return
+            self._pause(newcomer, TURN_S)
+            self._listen()
+            told, said = self._ask(key)
+            said = said or (told.reason if told is not None and told.state == "stands_by" else "")
+        if f"{old} has not answered" in said:
+            self._await_end_of_mute(old, new, newcomer)
+        elif new not in self.heard_now():
+            raise Refusal(f"{old} keeps the place: {said or f'{new} does not answer'}")
+
+    def _await_end_of_mute(self, old: str, new: str, newcomer: Newcomer) -> None:
         """An old stage that knows nothing of changing places, or hangs: the newcomer takes over when it is gone."""
         self._advise(f"{old} does not answer the question for its place: stop it now (SIGTERM), and {new} takes over")
 
         def taken() -> bool:
-            self._count(count)
+            self._listen()
             return new in self.heard_now()
 
         self._await(taken, newcomer, MUTE_WITHIN_S, f"{old} keeps the place: it does not yield, and it was not stopped", LOOK_S)
@@ -206,20 +209,24 @@ class SwapProcedure:
                 raise Refusal(f"{old} does not leave; it stands by, is not heard, and may be stopped")
             self._pause(newcomer, LOOK_S)
 
-    def _ask(self, selector: str, timeout_s: float = ASK_WITHIN_S) -> tuple[Voice | None, str]:
-        good, bad = get_all(self._session, selector, Voice, timeout_s=timeout_s)
+    def _ask(self, selector: str) -> tuple[Voice | None, str]:
+        """The answer, or why it was refused; neither where nobody answers in time."""
+        good, bad = get_all(self._session, selector, Voice, timeout_s=ASK_WITHIN_S)
         return (good[0][1], "") if good else (None, bad[0].reason if bad else "")
 
-    def _count(self, count: SwapCount) -> SwapCount:
+    def _listen(self) -> list[OfFrame]:
+        """Count what has come since the last call; the answers among it."""
+        answers: list[OfFrame] = []
         for _, payload, encoding in self._given.take():
             given = self._read(self._input, payload, encoding)
             if given is not None:
-                count.give(given.frame_id)
+                self._count.give(given.frame_id)
         for at_s, payload, encoding in self._ear.take():
             message = self._read(self._topic, payload, encoding)
             if message is not None:
-                count.hear(message.frame_id, message.instance, at_s)
-        return count
+                self._count.hear(message.frame_id, message.instance, at_s)
+                answers.append(message)
+        return answers
 
     def _read(self, topic: Topic, payload: bytes, encoding: str) -> OfFrame | None:
         try:

@@ -40,12 +40,13 @@ stage](swap.md)).
 
 ## Changing places
 
-Two processes of {swappable} can change places between two frames, ordered by `deixis swap`. A stage need not take part;
-one that does owes this ([swap.md](swap.md) shows it in Python):
+Two processes of one stage (of {swappable}) can change places between two frames, ordered by `deixis swap`.
+No stage need take part; one that does owes this ([swap.md](swap.md#replace-a-stage-while-it-runs) names an example):
 
 * Started with `DEIXIS_STAND_BY=1` in its environment it stands by: it works on all that comes, holds the token
-  `{standby_alive}` in place of the other, and puts its answers on `{standby}`, with the label and fields they would have.
-  Its health, if it gives one, says `standing_by`.
+  `{standby_alive}` in place of the other, and puts its answers on
+  `{standby}`, with the label and fields they would have. Its health, if it gives one, says
+  `standing_by`.
 * It answers gets on `deixis/{robot}/{stage}/voice/{instance}` with a `Voice`, or with an error that says why not:
   without a parameter, how it stands; and `?op=` one of these:
 * `take;from=OLD`, to one that stands by: it gets `?op=yield;to=ITSELF` from OLD. Where the answer comes within 1.5 s, the
