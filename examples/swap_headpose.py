@@ -105,6 +105,10 @@ def main():
         place = Place(session, given.robot, producer, stands_by=os.environ.get("DEIXIS_STAND_BY", "") not in ("", "0"))
         print(f"swap_headpose: alive as {producer.instance}", flush=True)
         held, first, run, age, lockstep = {}, defaultdict(list), None, RelativeAge(), False
+        # It is published on change only; who comes later asks for it.
+        for reply in session.get(topics.CAMERA_INFO.key(given.robot), timeout=1.0):
+            if reply.ok is not None and (info := read(topics.CAMERA_INFO, reply.ok)) is not None:
+                lockstep = info.lockstep
         while not (stopping or place.leaving):
             place.answer_questions()
             sample = tracks.try_recv()

@@ -72,8 +72,8 @@ class Newcomers:
         if process is None or process.popen is None:
             raise Refused(f"stage: there is no newcomer of {stage[:80]}")
         if not process.running:
-            ended = process.last_end or "at once"
-            raise Refused(f"the newcomer has ended ({ended}); its message stands in the supervisor's log")
+            ended = process.last_end or process.killed_for or "just now"
+            raise Refused(f"{ended}; its message stands in the supervisor's log")
         return self._instance(process.popen.pid)
 
     def look(self, alive: set[tuple[str, str]], now_s: float) -> None:

@@ -83,6 +83,6 @@ def test_a_command_that_ends_or_knows_nothing_of_standing_by_is_refused_and_the_
     assert "the newcomer has ended (status 1); heard now: " in ended.stderr
     wrong = swap(running, "headpose", "--set", "no_such_setting=1")
     assert wrong.returncode == 1
-    assert "the newcomer has ended (status 78)" in wrong.stderr
+    assert "the newcomer has ended (status 78; its message stands in the supervisor's log)" in wrong.stderr
     assert len(listener.instances()) == 1
     assert listener.unanswered() == []

@@ -86,7 +86,7 @@ def test_a_newcomer_that_ends_is_not_started_again_and_its_end_is_told(superviso
     until_ended(supervisor, NEWCOMER)
     supervisor.poll()
     assert not supervisor.processes[NEWCOMER].running
-    with pytest.raises(Refused, match=r"has ended \(killed by SIGKILL\)"):
+    with pytest.raises(Refused, match="killed by SIGKILL; its message stands in the supervisor's log"):
         newcomers.instance("headpose")
     assert newcomers.start("headpose", (), "router"), "another may come"
 

@@ -86,6 +86,14 @@ impl Stage<'_> {
         Ok(())
     }
 
+    /// The camera says whether the frames wait for us.
+    fn hear_camera(&mut self, info: &Sample) {
+        let (label, payload) = (info.encoding().to_string(), info.payload().to_bytes());
+        if let Ok(known) = decode::<CameraInfo>(&label, contract::CAMERA_INFO, &payload) {
+            self.lockstep = known.lockstep;
+        }
+    }
+
     fn reject(&mut self, why: String) {
         self.input.rejected += 1;
         if self
@@ -206,19 +214,22 @@ fn serve(session: &zenoh::Session, robot: &str) -> Result<(), Failure> {
             .wait()?,
         place: place::Place::new(stands_by),
     };
+    // It is published on change only; who comes later asks for it.
+    let replies = session
+        .get(key("camera/info"))
+        .timeout(Duration::from_secs(1))
+        .wait()?;
+    while let Ok(reply) = replies.recv() {
+        if let Ok(info) = reply.result() {
+            stage.hear_camera(info);
+        }
+    }
     voice.hold_token(&stage.place)?;
     let mut due = Instant::now();
     while !stopping.load(Ordering::Relaxed) && !voice.leaving {
         let sample = tracks.recv_timeout(TURN)?;
         if let Some(info) = infos.try_recv()? {
-            let payload = info.payload().to_bytes();
-            if let Ok(known) = decode::<CameraInfo>(
-                &info.encoding().to_string(),
-                contract::CAMERA_INFO,
-                &payload,
-            ) {
-                stage.lockstep = known.lockstep;
-            }
+            stage.hear_camera(&info);
         }
         if let Some(sample) = sample {
             stage.take(&sample)?;
