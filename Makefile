@@ -5,11 +5,11 @@ SITE ?=
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance bridges/ros2
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract references zenohd clean
+.PHONY: setup demo test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -38,7 +38,7 @@ test: setup check
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
-	@for tools in bench fitting; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
+	@for tools in bench fitting docs; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup
 	@$(BIN)/python bench/pipeline.py
@@ -46,6 +46,14 @@ bench: setup
 # After a change of messages or topics: JSON Schema, golden bytes, the topic table and the page for people
 contract: setup
 	@$(BIN)/python -m deixis_schemas.export schemas/contract docs/contract.md
+
+# After a change of settings or commands: their pages
+pages: setup
+	@$(BIN)/python docs/make_reference.py
+
+# The pages as a site in build/docs, to be read with a browser or served from anywhere
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir build/docs && echo "build/docs/index.html"
 
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup

@@ -34,6 +34,7 @@ LONGEST_FIRST = (
     "test_camera_process.py",
     "test_cli_system.py",
     "test_registry_service.py",
+    "test_ros2.py",
 )
 
 

@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -204,11 +205,13 @@ def write_environment(folder: Path) -> None:
     (folder / "pyvenv.cfg").write_text(f"home = {PYTHON}/bin\ninclude-system-site-packages = false\n")
     (folder / "bin").mkdir()
     (folder / "bin" / "python").symlink_to(f"{PYTHON}/bin/{version}")
-    for script in ("deixis", *(f"deixis-{Path(name).name}" for name in SERVICES)):
-        module = "deixis_cli.main" if script == "deixis" else f"{script.replace('-', '_')}.service"
-        path = folder / "bin" / script
-        path.write_text(f"#!/opt/deixis/bin/python\nimport sys\nfrom {module} import main\nsys.exit(main())\n")
-        path.chmod(0o755)
+    for name in ("cli", *SERVICES):
+        # The very functions that pip would name: with another of the same module `deixis watch` did not end by SIGTERM, once.
+        for script, called in tomllib.loads((ROOT / name / "pyproject.toml").read_text())["project"]["scripts"].items():
+            module, function = called.split(":")
+            path = folder / "bin" / script
+            path.write_text(f"#!/opt/deixis/bin/python\nimport sys\nfrom {module} import {function}\nsys.exit({function}())\n")
+            path.chmod(0o755)
 
 
 def _cgroup_kinds() -> dict[str, Path]:

@@ -1,4 +1,4 @@
-"""`deixis watch`: the answers of a running system as they come, and a line a second on what each stage sees."""
+"""`deixis watch`: the answers of a running system as they come; on a terminal with live beliefs and how the stages fare."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import open_client
 from deixis_schemas import topics
 from deixis_schemas.messages import Belief, Target
+from rich.console import Console
 
 from . import wording
 from .first_answer import FirstAnswer
@@ -21,12 +22,13 @@ from .inbox import Inbox, Received
 from .options import CommandError, add_connect, add_json, add_robot, seconds
 from .recorder import line_of
 from .summary import Summary
+from .watch_screen import WatchScreen
 
 TURN_S = 0.1
 LINE_EVERY_S = 1.0
 SILENT_S = 3.0
 # No frames: looking on must not pull the pictures over the link.
-WATCHED = (topics.CAMERA_INFO, topics.TRACKS, topics.HEAD_POSES, topics.GESTURES, topics.BELIEF, topics.TARGET)
+WATCHED = tuple(topic for topic in topics.TOPICS if topic not in (topics.FRAME, topics.STATE, topics.ROBOT_POSE))
 
 
 def register(subparsers: Any) -> None:
@@ -39,6 +41,7 @@ def register(subparsers: Any) -> None:
         "--until-answer", action="store_true", help="print the first final answer alone, also one given before, and stop"
     )
     parser.add_argument("--expect", metavar="POI_ID", help="with --until-answer: succeed only if it is exactly this POI")
+    parser.add_argument("--plain", action="store_true", help="lines alone, as where the output is no terminal")
     add_json(parser, "print JSON lines: each target, and a belief a second")
     parser.set_defaults(run=run)
 
@@ -54,17 +57,30 @@ def run(given: argparse.Namespace) -> int:
         interrupts = stack.enter_context(Interrupts())
         session = stack.enter_context(open_client(given.connect, shared_memory=False))
         inbox = Inbox()
-        for topic in (*WATCHED, topics.POI):
-            key = topic.key(given.robot, **({"id": "*"} if topic is topics.POI else {}))
+        for topic in WATCHED:
+            key = topic.key(given.robot, stage="*", id="*")
             stack.callback(session.declare_subscriber(key, inbox.store).undeclare)
         watch = Watch(session, inbox, interrupts, None if given.seconds is None else time.monotonic() + given.seconds)
         if given.until_answer:
             return _until_answer(watch, given)
-        printer = Printer(Summary(get_names(session, given.robot)), as_json=given.json)
+        _show(watch, given)
+    return 0
+
+
+def _show(watch: Watch, given: argparse.Namespace) -> None:
+    summary = Summary(get_names(watch.session, given.robot))
+    console = Console()
+    if given.json or given.plain or not console.is_terminal:
+        printer = Printer(summary, as_json=given.json)
         while watch.goes_on():
             for received in watch.turn():
                 printer.hear(received, time.monotonic())
-    return 0
+        return
+    with WatchScreen(console, given.robot, summary) as screen:
+        while watch.goes_on():
+            for received in watch.turn():
+                if received.message is not None:
+                    screen.hear(received.message)
 
 
 class Printer:

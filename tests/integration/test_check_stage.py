@@ -68,8 +68,10 @@ def test_what_is_found_names_the_cause(of_broken):
     assert "expected 'application/msgpack;Gestures/" in failed(of_broken["no_label"])["labels"]["found"]
 
 
-def test_our_own_stages_keep_the_contract():
-    done = at_once({stage: (stage, start, "--json") for stage, start in OURS.items()}, 5)
+def test_our_own_stages_and_the_shortest_example_keep_the_contract():
+    jobs = {stage: (stage, start, "--json") for stage, start in OURS.items()}
+    own = f"{sys.executable} {ROOT / 'examples' / 'own_gesture.py'} --robot {{robot}} --connect {{connect}}"
+    done = at_once(jobs | {"own": ("gesture", own, "--json")}, 6)
     for stage, result in done.items():
         assert result.returncode == 0, (stage, failed(result), result.stderr)
 

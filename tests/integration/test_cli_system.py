@@ -1,9 +1,13 @@
 """status, watch, doctor and poi on a running system."""
 
 import json
+import os
+import pty
 import re
+import select
 import signal
 import subprocess
+import time
 
 import pytest
 from deixis_schemas import codec
@@ -81,6 +85,35 @@ def test_watch_prints_answers_as_json_lines(ask):
     read = [json.loads(line) for line in out.splitlines()]
     assert {line["type"] for line in read} <= {"Belief", "Target"}
     assert {"key", "type", "seq", "stamp_ns", "received_ns", "message"} == set(read[0])
+
+
+def test_watch_on_a_terminal_draws_beliefs_and_stages_until_ctrl_c(running):
+    argv = command("deixis", "watch", "--robot", ROBOT, "--connect", running.endpoint)
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.execve(argv[0], argv, {**os.environ, "TERM": "xterm", "COLUMNS": "100", "LINES": "40"})
+    drawn = read_until(terminal, "not known (mass)", 30)
+    os.kill(pid, signal.SIGINT)
+    drawn += read_until(terminal, None, 30)
+    _, status = os.waitpid(pid, 0)
+    assert os.waitstatus_to_exitcode(status) == 0
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", drawn)
+    for stage in STAGES:
+        assert re.search(rf"{stage} +(ok|-)", plain), plain[-2000:]
+    assert "Traceback" not in drawn
+
+
+def read_until(terminal, word, within_s):
+    """What a program writes to its terminal until the word comes, or (None) until it ends."""
+    text, until_s = "", time.monotonic() + within_s
+    while time.monotonic() < until_s and (word is None or word not in text):
+        ready, _, _ = select.select([terminal], [], [], 0.1)
+        try:
+            text += os.read(terminal, 65536).decode(errors="replace") if ready else ""
+        except OSError:  # Linux' way to say that nobody holds the other side any more
+            return text
+    assert word is None or word in text, text[-2000:]
+    return text
 
 
 def test_watch_until_answer_prints_the_first_one_and_judges_it(ask, running):

@@ -8,6 +8,7 @@ import pytest
 from running import POINTED_AT, ROOT, command, free_port, process, system, wait_until
 
 SWAP = ROOT / "examples" / "swap_headpose.py"
+OWN = ROOT / "examples" / "own_gesture.py"
 
 
 def producers(running):
@@ -40,6 +41,20 @@ def test_the_example_takes_the_place_of_headpose_and_each_evidence_names_its_pro
     assert "yaw -" in evidence["headpose"]["observed"], "the head is turned to the person's right, which the example sees"
     assert POINTED_AT in target["poi_ids"], target["reason"]
     assert "Traceback" not in log.read_text()
+
+
+def test_the_shortest_stage_takes_the_place_of_gesture_and_the_poi_is_named(tmp_path, robot):
+    with system(tmp_path, robot, "--except", "gesture") as running:
+        started = [sys.executable, OWN, "--robot", robot, "--connect", running.endpoint, "--lockstep", "--instance", "own"]
+        with process(started, tmp_path / "own"):
+
+            def answers_by_it():
+                for target in running.state().get("recent_targets", []):
+                    if any(item["producer"] == "gesture/own" and item["weight"] > 0 for item in target["evidence"]):
+                        return target["poi_ids"]
+                return None
+
+            assert running.wait_until(answers_by_it, "an answer that rests on the example's gesture", 60) == [POINTED_AT]
 
 
 def started_alone(log, robot, endpoint, *arguments):

@@ -159,6 +159,7 @@ def wait_for_an_answer(host):
         finally:
             watch.terminate()
             host.run(["pkill", "-x", "deixis"], check=False)  # that was `nsenter`; the command itself lived on
+    wait_until(lambda: "deixis" not in host.commands(), "the command ends by SIGTERM", 10, host.log)
 
 
 def is_right(line):
