@@ -5,7 +5,7 @@ SITE ?=
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
