@@ -72,7 +72,8 @@ def _live(console: Console) -> Iterator[Show]:
 
     def show_line(album: Album, _name: str) -> None:
         nonlocal said
-        text = f"{len(album.kept)} pictures. {hint(cover(album.board, album.kept)) or 'Enough: go on for more, or Ctrl-C.'}"
+        todo = hint(cover(album.board, album.kept))
+        text = f"{len(album.kept)} pictures. {todo or f'Go on until there are {LIVE_WANTED}.'}"
         if text != said:
             said = text
             console.print(text, markup=False, highlight=False)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from deixis_camera.capture import source_for
 from deixis_camera.config import CameraConfig
-from deixis_camera.folders import is_picture, picture_files, read_picture
+from deixis_camera.folders import FOLDER_RATE_HZ, is_picture, picture_files, read_picture
 from deixis_camera.pictures import Normaliser
 from deixis_camera.sources import Image as AnyImage
 from deixis_camera.sources import PictureRefused, Source, SourceError, device_path, is_stream, local_path
@@ -34,13 +34,16 @@ SILENT_S = 5.0
 
 @dataclass(frozen=True)
 class Named:
-    """One picture: a name for people, and (h, w) or (h, w, 3) BGR pixels; none with why it cannot be used."""
+    """One picture: a name for people, and (h, w) or (h, w, 3) BGR pixels; none with why it cannot be used.
+
+    number: of a video or camera that of the picture, from 0. time_ns: of a recording from its start, else on a steady clock.
+    """
 
     name: str
     image: Image | None
     why: str = ""
     number: int = 0
-    """Of a video the number of the picture from 0."""
+    time_ns: int = 0
 
 
 @dataclass(frozen=True)
@@ -116,20 +119,20 @@ def open_camera_stage(robot: str, connect: str, interrupts: Interrupts) -> Itera
 
 
 def _read_files(files: Sequence[Path]) -> Iterator[Named]:
-    for path in files:
+    for number, path in enumerate(files):
         try:
             image = read_picture(path)
         except PictureRefused as error:
             yield Named(path.name, None, str(error))
         else:
-            yield _named(path.name, image, Normaliser(MAX_SIDE_PX))
+            yield _named(path.name, image, Normaliser(MAX_SIDE_PX), number, round(number * 1e9 / FOLDER_RATE_HZ))
 
 
-def _named(name: str, image: AnyImage, normaliser: Normaliser, number: int = 0) -> Named:
+def _named(name: str, image: AnyImage, normaliser: Normaliser, number: int, time_ns: int) -> Named:
     try:
-        return Named(name, normaliser.normalise(image), number=number)
+        return Named(name, normaliser.normalise(image), "", number, time_ns)
     except PictureRefused as error:
-        return Named(name, None, str(error), number)
+        return Named(name, None, str(error), number, time_ns)
 
 
 def _in_turn(source: Source) -> Iterator[Named]:
@@ -146,7 +149,7 @@ def _in_turn(source: Source) -> Iterator[Named]:
             return
         if picture is None:
             return
-        yield _named(f"{picture.time_ns / 1e9:.2f} s", picture.image, normaliser, picture.seq)
+        yield _named(f"{picture.time_ns / 1e9:.2f} s", picture.image, normaliser, picture.seq, picture.time_ns)
 
 
 @dataclass
@@ -168,7 +171,7 @@ class _Slot:
                 if picture is None:
                     self.failure = f"'{self.source.name}' has ended"
                     return
-                named = _named(f"picture {picture.seq}", picture.image, normaliser, picture.seq)
+                named = _named(f"picture {picture.seq}", picture.image, normaliser, picture.seq, picture.time_ns)
             except PictureRefused as error:
                 named = Named("?", None, str(error))
             except SourceError as error:

@@ -17,8 +17,8 @@ MAY_IMPORT = {
     "deixis_cli": {"deixis_schemas", "deixis_runtime"},
     "deixis_calibration": {
         *("deixis_schemas", "deixis_runtime", "deixis_cli"),
-        # It reads pictures as the camera does and writes what the camera reads.
-        "deixis_camera",
+        # It reads pictures as the camera does, writes what the camera reads, shows what the tracker sees, and asks fusion.
+        *("deixis_camera", "deixis_tracker", "deixis_fusion"),
     },
     "deixis_conformance": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
