@@ -2,14 +2,15 @@
 PYTHON ?= python3.11
 SOURCE ?=
 SITE ?=
+DEMO_RECORDING := out/demo/pointing.mcap
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance calibration
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2 calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract references zenohd clean
+.PHONY: setup rerun demo view test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -26,11 +27,27 @@ setup: .venv/.installed
 demo: setup
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
-		--registry $$registry --expect P3; status=$$?; rm -f $$registry*; exit $$status
+		--registry $$registry --expect P3 --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; exit $$status
+	@echo "\nTo see what it just did: make view (in a window), or make view WEB=1 (in a browser)"
 else
+	@echo "To see it while it runs, from another terminal: make rerun, once, then $(BIN)/deixis view --robot demo (or with --web)"
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
 	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run "$$@"
 endif
+
+# What the last 'make demo' did, in pictures: in a window, or with WEB=1 as a page for this machine's browsers
+WEB ?=
+view: rerun
+	@[ -f $(DEMO_RECORDING) ] || $(MAKE) --no-print-directory demo
+	@$(BIN)/deixis view $(DEMO_RECORDING) --site examples/pointing.yaml --pictures examples/pointing.mp4 $(if $(WEB),--web)
+
+# The viewer's library, which is large: whoever wants to see has it installed, and nobody else waits for it.
+rerun: .venv/.rerun
+
+.venv/.rerun: .venv/.installed view/pyproject.toml
+	@echo "installing Rerun (660 MB) ..."
+	@$(PIP) --no-build-isolation -e 'view[rerun]'
+	@touch $@
 
 test: setup check
 	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
@@ -38,7 +55,7 @@ test: setup check
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
-	@for tools in bench fitting; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
+	@for tools in bench fitting docs; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup
 	@$(BIN)/python bench/pipeline.py
@@ -46,6 +63,14 @@ bench: setup
 # After a change of messages or topics: JSON Schema, golden bytes, the topic table and the page for people
 contract: setup
 	@$(BIN)/python -m deixis_schemas.export schemas/contract docs/contract.md
+
+# After a change of settings or commands: their pages
+pages: setup
+	@$(BIN)/python docs/make_reference.py
+
+# The pages as a site in build/docs, to be read with a browser or served from anywhere
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir build/docs && echo "build/docs/index.html"
 
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup
