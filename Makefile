@@ -7,7 +7,7 @@ export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 LINEUP ?= classic
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2 calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 # Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
 MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
