@@ -7,7 +7,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -21,6 +21,7 @@ from deixis_schemas.messages import Message, Voice
 from .hang_watch import HangWatch
 from .launching import Forkable, ForkServer
 from .leftovers import Leftovers, remove_unused
+from .lineups import guest_command
 from .link_security import LinkSecurity, SecurityError
 from .newcomers import Newcomers, settings_of
 from .notifications import Notifications
@@ -55,7 +56,8 @@ class HostFailed(RuntimeError):
 class HostOptions:
     """What runs on a host, where it is reached, and how its links are guarded.
 
-    fork: its processes are forked from one that has done their imports.
+    fork: its processes are forked from one that has done their imports. guests: who stands in the place of stages, by stage
+    (`lineups`).
     """
 
     robot: str
@@ -69,6 +71,7 @@ class HostOptions:
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
     fork: bool = True
+    guests: Mapping[str, str] = field(default_factory=dict)
 
 
 def installed_stages() -> set[str]:
@@ -209,7 +212,7 @@ class Host:
     def forkables(self) -> list[Forkable]:
         """The router and our own stages, of which a test holds that their imports start no threads."""
         own = [item.name for item in entry_points(group="deixis.stages") if item.value == f"deixis_{item.name}.service:main"]
-        stages = [name for name in self.options.stages if name in own]
+        stages = [name for name in self.options.stages if name in own and name not in self.options.guests]
         return [
             Forkable(ROUTER_COMMAND, "deixis_runtime.router:main"),
             *(Forkable((str(_script(name)),), f"deixis_{name}.service:main") for name in stages),
@@ -260,9 +263,10 @@ class Host:
         return set(names) - (self._node.alive_stages() if self._node else set())
 
     def _stage_command(self, name: str) -> list[str]:
-        script = _script(name)
+        guest = self.options.guests.get(name)
+        script = guest_command(name, guest) if guest else _script(name)
         if not script.exists():
-            raise HostFailed(f"stage '{name}' is registered but its command {script.name} is not beside {sys.executable}")
+            raise HostFailed(f"stage '{name}': its command {script.name} is not in {script.parent}")
         command = [str(script), "--supervised", "--robot", self.options.robot, "--connect", self.endpoint]
         if self.options.site:
             command += ["--site", str(self.options.site)]
