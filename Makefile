@@ -6,14 +6,14 @@ export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 LINEUP ?= classic
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance bridges/ros2
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 # Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
 MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
 GUESTS := .venv/guests/mediapipe
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup guests demo test check bench contract references zenohd clean
+.PHONY: setup guests demo test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -58,7 +58,7 @@ test: setup check
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES) $(foreach g,$(MEDIAPIPE),guests/$(g)/deixis_$(g))
-	@for tools in bench fitting; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
+	@for tools in bench fitting docs; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup
 	@$(BIN)/python bench/pipeline.py
@@ -66,6 +66,14 @@ bench: setup
 # After a change of messages or topics: JSON Schema, golden bytes, the topic table and the page for people
 contract: setup
 	@$(BIN)/python -m deixis_schemas.export schemas/contract docs/contract.md
+
+# After a change of settings or commands: their pages
+pages: setup
+	@$(BIN)/python docs/make_reference.py
+
+# The pages as a site in build/docs, to be read with a browser or served from anywhere
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir build/docs && echo "build/docs/index.html"
 
 # After a meant change of what a stage answers to the shipped clips: says what has changed, and keeps it
 references: setup

@@ -19,10 +19,9 @@ from deixis_runtime.lineups import CLASSIC
 from rich.console import Console
 
 from .chosen_clips import Choice, Chosen, choose
-from .clip_progress import played
 from .clip_score import ClipScore
-from .clips import Clip, ClipError
-from .evaluate import EvaluationOptions, Interrupted, evaluate_clip
+from .clips import ClipError
+from .evaluate import EvaluationOptions, evaluate_clip
 from .fusion_command import check_fusion, run_fusion
 from .gesture_command import check_gesture, run_gesture
 from .hand_confusion import write_confusion
@@ -31,6 +30,7 @@ from .headpose_report import HeadposeConditions
 from .json_file import check_writable, write_json
 from .machine import describe_machine, say_machine
 from .report import Conditions, report
+from .scored_clips import Scored, score_each
 from .seeds import SeedsError
 from .slices import Slice, slices_of
 from .stand_ins import read_stages, say_blind
@@ -115,13 +115,11 @@ def _run_system(given: argparse.Namespace) -> int:
     if blind is not None:
         print(f"deixis eval: {blind}", file=sys.stderr)
     os.environ.setdefault("DEIXIS_LOG", "WARNING")
-    try:
-        scores = _evaluate(chosen.clips, options)
-    except Interrupted as interrupt:
-        print(f"deixis eval: {interrupt} before the end", file=sys.stderr)
-        return 128 + interrupt.signal
+    scored = score_each(chosen.clips, lambda clip, on_frame: evaluate_clip(clip, options, on_frame))
+    if not scored.scores:
+        return scored.status()
     conditions = Conditions(chosen.folder, given.lockstep, chosen.seeds, given.truth, chosen.plain)
-    return _tell(conditions, given.json, scores, slices_of(chosen.clips, scores))
+    return _tell(conditions, given.json, scored, slices_of(chosen.clips[: len(scored.scores)], scored.scores))
 
 
 def _run_headpose(given: argparse.Namespace) -> int:
@@ -151,12 +149,12 @@ def _run_gesture(given: argparse.Namespace) -> int:
     chosen = _choose(given)
     check_writable(given.json)
     check_writable(given.confusion, "--confusion")
-    status, scores = run_gesture(chosen, setup, sets, given.json, _console())
-    if given.confusion is not None:
+    scored = run_gesture(chosen, setup, sets, given.json, _console())
+    if given.confusion is not None and scored.stopped is None:  # of some of the clips it would say that it is of all
         clips = f"{'plain ' * chosen.plain}seeds {chosen.seeds}" if chosen.seeds else f"clips of {chosen.folder.name}"
-        strokes = [stroke for score in scores for stroke in score.strokes]
+        strokes = [stroke for score in scored.scores for stroke in score.strokes]
         write_confusion(given.confusion, strokes, f"deixis eval --stage gesture, {clips}")
-    return status
+    return scored.status()
 
 
 def _run_fusion(given: argparse.Namespace) -> int:
@@ -181,16 +179,6 @@ def _choose(given: argparse.Namespace) -> Chosen:
         raise CommandError(str(error)) from None
 
 
-def _evaluate(clips: Sequence[Clip], options: EvaluationOptions) -> list[ClipScore]:
-    scores = []
-    for clip, on_frame, complain in played(clips):
-        score = evaluate_clip(clip, options, on_frame)
-        if score.failure is not None:
-            complain(f"{clip.name}: {score.failure}")
-        scores.append(score)
-    return scores
-
-
 def _console() -> Console:
     console = Console()
     if not console.is_terminal:
@@ -198,20 +186,18 @@ def _console() -> Console:
     return console
 
 
-def _tell(conditions: Conditions, json_file: Path | None, scores: Sequence[ClipScore], slices: Sequence[Slice]) -> int:
+def _tell(conditions: Conditions, json_file: Path | None, scored: Scored[ClipScore], slices: Sequence[Slice]) -> int:
+    scores = scored.scores
     summary, machine, console = summarise(scores), describe_machine(), _console()
     print_scores(console, scores, summary, slices)
     if conditions.truth:
         console.print(say_truth(conditions.truth, summary), markup=False, highlight=False, soft_wrap=True)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
-    write_json(json_file, report(conditions, scores, summary, slices, machine))
+    write_json(json_file, {**report(conditions, scores, summary, slices, machine), "clips_left": scored.left})
     unanswered = [score.name for score in scores if score.failure is None and score.frames_answered < score.frames]
     if conditions.lockstep and unanswered:
         print(f"deixis eval: not reproducible, for frames went without an answer: {', '.join(unanswered)}", file=sys.stderr)
-    if summary.failed:
-        print(f"deixis eval: {len(summary.failed)} of {summary.clips} clips were not played", file=sys.stderr)
-        return 1
-    return 0
+    return scored.status()
 
 
 def _names(text: str) -> tuple[str, ...]:

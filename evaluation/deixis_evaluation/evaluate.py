@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from deixis_schemas.messages import Belief, Message
 
 from .clip_score import ClipScore, failed_clip, score_clip
 from .clips import Clip, ClipError
+from .interrupted import Interrupted
 from .recording import RecordingError, read_recording
 from .speaker import Speakers
 from .stand_ins import speakers_for
@@ -23,14 +23,6 @@ ROBOT = "eval"
 START_S = 60.0
 FRAME_S = 0.7
 """Longest time a frame may take on average before a clip is given up."""
-
-
-class Interrupted(Exception):
-    """SIGINT or SIGTERM came while a clip was played; `signal` says which."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(f"stopped by {signal.Signals(number).name}")
-        self.signal = number
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ Keys of its JSON file are those of `fusion_summary.figures`, and stay.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -18,13 +17,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from .chosen_clips import Chosen
-from .clip_progress import played
 from .core_config import core_config
 from .episode_scores import OUTCOMES, EpisodeScore
 from .fusion_play import GAPS_DEG, VARIANTS, FusionScore, evaluate_fusion
 from .fusion_summary import CAUSES, DEFINITION, Bin, calibration_error, faults, figures, luck, named_at, outcomes, reliability
 from .json_file import write_json
 from .machine import describe_machine, say_machine
+from .scored_clips import score_each
 from .table import COLOURS, number, percent
 
 
@@ -43,12 +42,10 @@ def run_fusion(
 ) -> int:
     """Play, print, write. 0 when all clips were played, 1 when one was not."""
     cv2.setNumThreads(1)  # as the stages do
-    scores = []
-    for clip, on_frame, complain in played(chosen.clips):
-        score = evaluate_fusion(clip, config, on_frame)
-        if score.failure is not None:
-            complain(f"{clip.name}: {score.failure}")
-        scores.append(score)
+    scored = score_each(chosen.clips, lambda clip, on_frame: evaluate_fusion(clip, config, on_frame))
+    scores = scored.scores
+    if not scores:
+        return scored.status()
     machine = describe_machine()
     for table in (stroke_table(scores), outcome_table(scores), gap_table(scores)):
         console.print(table)
@@ -64,13 +61,11 @@ def run_fusion(
         "seeds": chosen.seeds,
         "plain": chosen.plain,
         "settings": settings,
+        "clips_left": scored.left,
     }
     clips = {score.name: _clip(score) for score in scores}
     write_json(json_file, {**said, "definitions": [DEFINITION], "summary": figures(scores), "clips": clips})
-    failed = sum(score.failure is not None for score in scores)
-    if failed:
-        print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
-    return 1 if failed else 0
+    return scored.status()
 
 
 def stroke_table(scores: Sequence[FusionScore]) -> Table:

@@ -5,7 +5,6 @@ Keys of its JSON file are those of `gesture_summary.figures`, and stay.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from rich.markup import escape
 from rich.table import Table
 
 from .chosen_clips import Chosen
-from .clip_progress import played
 from .core_config import core_config
 from .gesture_play import GestureSetup, evaluate_gestures
 from .gesture_scores import DEFINITION, GestureScore, StrokeScore
@@ -27,6 +25,7 @@ from .gesture_summary import figures, stroke_figures, summarise_gestures
 from .json_file import write_json
 from .machine import describe_machine, say_machine
 from .proportion import Proportion
+from .scored_clips import Scored, score_each
 from .table import number, percent
 
 BEFORE = "tracker"
@@ -51,15 +50,13 @@ def check_gesture(truth: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Ge
 
 def run_gesture(
     chosen: Chosen, setup: GestureSetup, sets: Mapping[str, Sequence[str]], json_file: Path | None, console: Console
-) -> tuple[int, list[GestureScore]]:
-    """Play, print, write: 0 when all clips were played, 1 when one was not; and the scores."""
+) -> Scored[GestureScore]:
+    """Play, print, write."""
     cv2.setNumThreads(1)  # as the stages do
-    scores = []
-    for clip, on_frame, complain in played(chosen.clips):
-        score = evaluate_gestures(clip, setup, on_frame)
-        if score.failure is not None:
-            complain(f"{clip.name}: {score.failure}")
-        scores.append(score)
+    scored = score_each(chosen.clips, lambda clip, on_frame: evaluate_gestures(clip, setup, on_frame))
+    scores = scored.scores
+    if not scores:
+        return scored
     machine = describe_machine()
     console.print(table_of(scores))
     console.print(summary_of(scores))
@@ -73,14 +70,12 @@ def run_gesture(
         "seeds": chosen.seeds,
         "plain": chosen.plain,
         "settings": settings,
+        "clips_left": scored.left,
     }
     truth, clips = [BEFORE] if setup.true_tracks else [], {score.name: _clip(score) for score in scores}
     summary = {"clips": len(scores), **figures(scores)}
     write_json(json_file, {**said, "truth": truth, "definitions": [DEFINITION], "summary": summary, "clips": clips})
-    failed = sum(score.failure is not None for score in scores)
-    if failed:
-        print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
-    return (1 if failed else 0), scores
+    return scored
 
 
 def table_of(scores: Sequence[GestureScore]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -13,7 +12,8 @@ from deixis_tracker.config import TrackerConfig
 from rich.console import Console
 
 from .chosen_clips import Chosen
-from .clip_progress import played
+from .clip_progress import OnFrame
+from .clips import Clip
 from .core_config import core_config
 from .headpose_play import HeadposeSetup, evaluate_heads
 from .headpose_report import HeadposeConditions, headpose_report
@@ -21,6 +21,7 @@ from .headpose_scores import HeadposeScore
 from .headpose_table import print_headpose
 from .json_file import write_json
 from .machine import describe_machine, say_machine
+from .scored_clips import score_each
 
 BEFORE = "tracker"
 """The stage that headpose is fed by: the truth can stand for it, and it can be set."""
@@ -54,22 +55,22 @@ def run_headpose(
     """Play, draw into `out`, and tell. 0 when all clips were played, 1 when one was not. Raises CommandError."""
     draw = drawer(out)
     cv2.setNumThreads(1)  # as the stages do
-    scores = []
-    for clip, on_frame, complain in played(chosen.clips):
-        score = evaluate_heads(clip, setup, on_frame)
-        if score.failure is not None:
-            complain(f"{clip.name}: {score.failure}")
-        elif out is not None:
-            draw(out / f"{clip.name}.png", score)
-        scores.append(score)
+
+    def score(clip: Clip, on_frame: OnFrame) -> HeadposeScore:
+        found = evaluate_heads(clip, setup, on_frame)
+        if found.failure is None and out is not None:
+            draw(out / f"{clip.name}.png", found)
+        return found
+
+    scored = score_each(chosen.clips, score)
+    scores = scored.scores
+    if not scores:
+        return scored.status()
     machine = describe_machine()
     print_headpose(console, scores)
     console.print(say_machine(machine), style="dim", markup=False, highlight=False, soft_wrap=True)
-    write_json(json_file, headpose_report(conditions, scores, machine))
-    failed = sum(score.failure is not None for score in scores)
-    if failed:
-        print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
-    return 1 if failed else 0
+    write_json(json_file, {**headpose_report(conditions, scores, machine), "clips_left": scored.left})
+    return scored.status()
 
 
 def drawer(out: Path | None) -> Draw:

@@ -7,13 +7,16 @@ combination shows how often it is sure and wrong. What the paper leaves open is 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from deixis_cli.options import CommandError, stage_settings
 from deixis_fusion.config import FusionConfig
+from deixis_runtime.interrupts import Interrupts
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -61,7 +64,11 @@ def run(given: argparse.Namespace) -> int:
     check_writable(given.json)
     draw = _drawer(given.out)
     started = time.perf_counter()
-    results = _simulate(study)
+    results, done, stopped = _simulate(study)
+    if not done and stopped is not None:
+        print("deixis paper: stopped before the first trials were done", file=sys.stderr)
+        return 128 + stopped
+    study = replace(study, trials=done)
     seconds = time.perf_counter() - started
     console, machine = Console(), describe_machine()
     if not console.is_terminal:
@@ -73,18 +80,20 @@ def run(given: argparse.Namespace) -> int:
     )
     write_json(given.json, report(study, results, seconds, given.sets, machine))
     draw(study)
+    if stopped is not None:
+        said = f"stopped after {done} of {given.trials} trials in each room; the figures are of these"
+        print(f"deixis paper: {said}", file=sys.stderr)
+        return 128 + stopped
     return 0
 
 
-def _simulate(study: Study) -> dict[str, RoomResult]:
-    simulation, results = Simulation(study), {}
+def _simulate(study: Study) -> tuple[dict[str, RoomResult], int, int | None]:
+    """The results, the trials that each room had, and the signal that stopped it."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("trials"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=study.trials * len(ROOMS))
-        for index, room in enumerate(ROOMS):
-            progress.update(task, description=f"room {room.name}")
-            results[room.name] = simulation.run(room, index, lambda count: progress.advance(task, count))
-    return results
+    with Interrupts() as interrupts, Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("three rooms", total=study.trials * len(ROOMS))
+        results, done = Simulation(study).run_all(lambda count: progress.advance(task, count), interrupts.requested)
+    return results, done, interrupts.signal if done < study.trials else None
 
 
 def _config(sets: list[str]) -> FusionConfig:

@@ -17,7 +17,7 @@ from .paper_deixis import OURS, PAPERS, DeixisModel
 from .paper_figures import Counts, count, sizes
 from .paper_ideal import ideal_answers
 from .paper_masses import RULES, Answers, Sources, answers, conflict, dempster, sources
-from .paper_rooms import Room
+from .paper_rooms import ROOMS, Room
 from .paper_trials import Trials, perceive, regions
 from .proportion import Proportion
 
@@ -92,6 +92,24 @@ class Simulation:
         if study.mode == "deixis" or study.mismatch > 0:
             self._ours["deixis_paper_readings"] = DeixisModel.of(config, self._perceived, PAPERS)
             self._ours["deixis"] = DeixisModel.of(config, self._perceived, OURS)
+
+    def run_all(self, on_trials: OnTrials, is_stopped: Callable[[], bool] = lambda: False) -> tuple[dict[str, RoomResult], int]:
+        """Simulate all rooms, a part of each in turn: when it is stopped, all have had the same number of trials.
+
+        Returns the results by the rooms' names, and that number: less than asked for where it was stopped, and 0 at least.
+        """
+        results: dict[str, RoomResult] = {}
+        done = 0
+        for part, size in enumerate(_parts(self._study.trials)):
+            found: dict[str, RoomResult] = {}
+            for index, room in enumerate(ROOMS):
+                if is_stopped():
+                    return results, done
+                found[room.name] = self._part(room, (index, part), size)
+                on_trials(size)
+            results = {name: results[name] + new if results else new for name, new in found.items()}
+            done += size
+        return results, done
 
     def run(self, room: Room, index: int, on_trials: OnTrials = lambda _count: None) -> RoomResult:
         """Simulate the room, the `index`-th; `on_trials` is told how many trials were done since it was last told."""

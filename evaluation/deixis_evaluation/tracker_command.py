@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from rich.table import Table
 
 from .blob_scores import BlobScores, Recall
 from .chosen_clips import Chosen
-from .clip_progress import OnFrame, played
+from .clip_progress import OnFrame
 from .clips import Clip, TrueFrame
 from .core_config import core_config
 from .json_file import write_json
@@ -26,6 +25,7 @@ from .machine import describe_machine, say_machine
 from .matching import DEFINITION
 from .proportion import Proportion
 from .replay import Picture
+from .scored_clips import score_each
 from .table import number, percent
 from .tracker_play import FAR_FACE_WIDTHS, TrackerScore, evaluate_tracker
 from .tracker_video import VideoError, check_video, drawn_into
@@ -59,12 +59,10 @@ def run_tracker(
     """Play, draw into `video`, and tell. 0 when all clips were played, 1 when one was not. Raises CommandError."""
     check_video(video, chosen.clips)
     cv2.setNumThreads(1)  # as the stage does
-    scores = []
-    for clip, on_frame, complain in played(chosen.clips):
-        score = _play(clip, config, video, on_frame)
-        if score.failure is not None:
-            complain(f"{clip.name}: {score.failure}")
-        scores.append(score)
+    scored = score_each(chosen.clips, lambda clip, on_frame: _play(clip, config, video, on_frame))
+    scores = scored.scores
+    if not scores:
+        return scored.status()
     machine = describe_machine()
     console.print(table_of(scores))
     for definition in DEFINITIONS:
@@ -80,12 +78,10 @@ def run_tracker(
         "seeds": chosen.seeds,
         "plain": chosen.plain,
         "settings": settings,
+        "clips_left": scored.left,
     }
     write_json(json_file, {**said, "definitions": list(DEFINITIONS), "summary": whole, "clips": clips})
-    failed = sum(score.failure is not None for score in scores)
-    if failed:
-        print(f"deixis eval: {failed} of {len(scores)} clips were not played", file=sys.stderr)
-    return 1 if failed else 0
+    return scored.status()
 
 
 def _play(clip: Clip, config: TrackerConfig, video: Path | None, on_frame: OnFrame) -> TrackerScore:

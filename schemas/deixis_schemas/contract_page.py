@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
 from .messages import TYPES, Message
+from .schema_words import default_of, link, what
 from .topics import INPUTS, STAGES, TOPICS, Topic, alive_key
 
 INTRODUCTION = """# The contract
@@ -54,7 +54,7 @@ def _topics() -> Iterator[str]:
         by_get = "yes" if topic.queryable else "no"
         oldest = f"{topic.max_age_s:g} s" if topic.max_age_s else "-"
         yield (
-            f"| `{topic.path}` | {_link(_name(topic))} | {_when(topic)} | {by_get} | {_size(topic.max_bytes)} | {oldest} "
+            f"| `{topic.path}` | {link(_name(topic))} | {_when(topic)} | {by_get} | {_size(topic.max_bytes)} | {oldest} "
             f"| {topic.delivery.value} |"
         )
     yield "\nWhat it means when nothing comes:\n"
@@ -95,77 +95,17 @@ def _type(name: str, schema: dict[str, Any], description: str) -> Iterator[str]:
     yield "|---|---|---|---|"
     required = schema.get("required", [])
     for field, content in schema.get("properties", {}).items():
-        default = "" if field in required else _default(content)
-        yield f"| `{field}` | {_what(content)} | {default} | {' '.join(content.get('description', '').split())} |"
+        default = "" if field in required else default_of(content)
+        yield f"| `{field}` | {what(content)} | {default} | {' '.join(content.get('description', '').split())} |"
     yield ""
-
-
-def _what(content: dict[str, Any]) -> str:
-    """The kind of a value, with its bounds."""
-    if "$ref" in content:
-        return _link(content["$ref"].rsplit("/", 1)[-1])
-    if "anyOf" in content:
-        return " or ".join(_what(option) for option in content["anyOf"])
-    if "enum" in content:
-        return ", ".join(f"`{value}`" for value in content["enum"])
-    return _array(content) if content.get("type") == "array" else _plain(content)
-
-
-def _plain(content: dict[str, Any]) -> str:
-    if isinstance(content.get("additionalProperties"), dict):
-        return f"map of text to {_what(content['additionalProperties'])}"
-    kind = str(content.get("type", "any"))
-    kind = {"null": "none", "string": "text", "object": "map"}.get(kind, kind)
-    return ("bytes" if content.get("format") in ("binary", "base64url") else kind) + _bounds(content)
-
-
-def _array(content: dict[str, Any]) -> str:
-    if "prefixItems" in content:
-        inside = [_what(item) for item in content["prefixItems"]]
-        return f"[{', '.join(inside)}]" if len(set(inside)) > 1 else f"{len(inside)} of: {inside[0]}"
-    most = f", {content['maxItems']} at most" if "maxItems" in content else ""
-    return f"list of {_what(content.get('items', {}))}{most}"
-
-
-def _bounds(content: dict[str, Any]) -> str:
-    words = {
-        "minimum": "from {}", "exclusiveMinimum": "above {}", "maximum": "to {}", "exclusiveMaximum": "below {}",
-        "minLength": "{} long at least", "maxLength": "{} long at most", "pattern": "`{}`",
-    }  # fmt: skip
-    said = [text.format(_number(content[key])) for key, text in words.items() if key in content]
-    return f" ({' '.join(said)})" if said else ""
-
-
-def _number(value: object) -> str:
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return "2^63 - 1" if value == 2**63 - 1 else f"{value:g}"
-    return str(value).replace("|", "\\|")
-
-
-def _default(content: dict[str, Any]) -> str:
-    if "default" not in content:
-        return "empty" if content.get("type") in ("array", "object") else "all defaults"
-    value = content["default"]
-    if value is None:
-        return "none"
-    return f"`{json.dumps(value)}`" if value != "" else "empty"
 
 
 def _description(type_: type[Message]) -> str:
     return type_.__doc__ or ""
 
 
-def _link(heading: str) -> str:
-    return f"[{heading}](#{_anchor(heading)})"
-
-
 def _name(topic: Topic) -> str:
     return f"{topic.type.__name__}/{topic.version}"
-
-
-def _anchor(heading: str) -> str:
-    """As GitHub and mkdocs make them of a heading."""
-    return heading.lower().replace("/", "")
 
 
 def _when(topic: Topic) -> str:

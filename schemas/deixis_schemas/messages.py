@@ -369,7 +369,9 @@ class Poi(Message):
     name: Annotated[Text, Line] = Field(default="", description="For people, one line; the id where it is empty.")
     position_m: Position = Field(description="Centre in the map frame, x, y, z, metres.")
     extent_m: float = Field(default=0.5, ge=0, le=1000, description="Size across, metres.")
-    tags: list[Annotated[str, Field(max_length=64), Line]] = Field(default_factory=list, max_length=32)
+    tags: list[Annotated[str, Field(max_length=64), Line]] = Field(
+        default_factory=list, max_length=32, description="Words to sort it by; Deixis keeps them and makes nothing of them."
+    )
     edited_by: Annotated[str, Field(max_length=128), Line] = Field(
         default="", description="Who put it there, where that was told."
     )

@@ -1,4 +1,7 @@
-"""Arrows point down: cli, conformance, evaluation, simulation -> services -> runtime -> schemas; no service imports another."""
+"""Arrows point down: cli, conformance, evaluation, simulation -> services -> runtime -> schemas; no service imports another.
+
+A bridge stands where a service does.
+"""
 
 import ast
 from pathlib import Path
@@ -12,6 +15,7 @@ MAY_IMPORT = {
     "deixis_runtime": {"deixis_schemas"},
     **{f"deixis_{name}": {"deixis_schemas", "deixis_runtime"} for name in SERVICES},
     "deixis_cli": {"deixis_schemas", "deixis_runtime"},
+    "deixis_ros2": {"deixis_schemas", "deixis_runtime"},
     "deixis_conformance": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
     **{f"deixis_{name}_mediapipe": {"deixis_schemas", "deixis_runtime"} for name in ("tracker", "headpose", "gesture")},

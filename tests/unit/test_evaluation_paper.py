@@ -222,6 +222,26 @@ def test_a_study_is_reproducible_and_all_modes_see_the_same_trials() -> None:
     assert other.by_mode["paper"] != paper.by_mode["paper"]
 
 
+def test_all_rooms_by_turns_give_what_each_room_alone_gives() -> None:
+    simulation = Simulation(Study(PART + 10, seed=4))
+    results, done = simulation.run_all(lambda _count: None)
+    assert done == PART + 10
+    alone = {room.name: simulation.run(room, index) for index, room in enumerate(ROOMS)}
+    assert {name: result.by_mode["paper"] for name, result in results.items()} == {
+        name: result.by_mode["paper"] for name, result in alone.items()
+    }
+
+
+def test_stopped_rooms_have_had_the_same_trials_each_as_if_no_more_had_been_asked_for() -> None:
+    told: list[int] = []
+    stopped, done = Simulation(Study(3 * PART, seed=4)).run_all(told.append, lambda: len(told) > len(ROOMS))
+    assert done == PART
+    asked, _ = Simulation(Study(PART, seed=4)).run_all(lambda _count: None)
+    assert {name: result.by_mode["paper"] for name, result in stopped.items()} == {
+        name: result.by_mode["paper"] for name, result in asked.items()
+    }
+
+
 def test_trials_come_in_parts_and_all_are_counted() -> None:
     told: list[int] = []
     result = Simulation(Study(PART + 10, seed=4)).run(ROOM_A, 0, told.append)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from deixis_cli.options import CommandError, read_site, stage_settings
-from deixis_evaluation.evaluate import Interrupted
+from deixis_evaluation.interrupted import Interrupted
 from deixis_runtime.host import chosen_stages
 from rich.console import Console
 from rich.markup import escape
