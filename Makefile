@@ -2,18 +2,19 @@
 PYTHON ?= python3.11
 SOURCE ?=
 SITE ?=
+DEMO_RECORDING := out/demo/pointing.mcap
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
 LINEUP ?= classic
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance bridges/ros2
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2 calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
 # Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
 MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
 GUESTS := .venv/guests/mediapipe
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup guests demo test check bench contract references pages docs zenohd clean
+.PHONY: setup guests rerun demo view test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -46,11 +47,27 @@ $(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests
 demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
-		--registry $$registry --expect P3 --lineup "$(LINEUP)"; status=$$?; rm -f $$registry*; exit $$status
+		--registry $$registry --expect P3 --lineup "$(LINEUP)" --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
+		printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status
 else
+	@echo "To see it while it runs, from another terminal: make rerun, once, then $(BIN)/deixis view --robot demo (or with --web)"
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
 	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run --lineup "$(LINEUP)" "$$@"
 endif
+
+# What the last 'make demo' did, in pictures: in a window, or with WEB=1 as a page for this machine's browsers
+WEB ?=
+view: rerun
+	@[ -f $(DEMO_RECORDING) ] || $(MAKE) --no-print-directory demo
+	@$(BIN)/deixis view $(DEMO_RECORDING) --site examples/pointing.yaml --pictures examples/pointing.mp4 $(if $(WEB),--web)
+
+# The viewer's library, which is large: whoever wants to see has it installed, and nobody else waits for it.
+rerun: .venv/.rerun
+
+.venv/.rerun: .venv/.installed view/pyproject.toml
+	@echo "installing Rerun (660 MB) ..."
+	@$(PIP) --no-build-isolation -e 'view[rerun]'
+	@touch $@
 
 test: setup check
 	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.

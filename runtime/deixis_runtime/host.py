@@ -16,15 +16,18 @@ from typing import Self
 
 import zenoh
 from deixis_schemas import topics
+from deixis_schemas.messages import Message, Voice
 
 from .hang_watch import HangWatch
 from .launching import Forkable, ForkServer
 from .leftovers import Leftovers, remove_unused
 from .lineups import guest_command
 from .link_security import LinkSecurity, SecurityError
+from .newcomers import Newcomers, settings_of
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
 from .procfs import locked_inodes
+from .queries import Query, Refused, check_names
 from .router import router_config
 from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
@@ -109,6 +112,7 @@ class Host:
         self._stack = ExitStack()
         self._watch: HangWatch
         self._node: Node | None = None
+        self._newcomers = Newcomers(self.supervisor, self._stage_command, default_instance)
         self._leftovers = Leftovers()
         self._held_looked_s = 0.0
         self._stopped: Callable[[], bool] = lambda: False
@@ -167,6 +171,8 @@ class Host:
             self._held_looked_s = now_s
             self._note_held()
             self._remove_leftovers()
+        if self._node is not None:
+            self._newcomers.look(self._node.alive_processes(), now_s)
         self._tell(now_s)
         failed = self.supervisor.failed()
         if ROUTER in failed or (self.options.stages and failed.keys() >= set(self.options.stages)):
@@ -183,6 +189,23 @@ class Host:
             self._node.count_to(f"restarts_{process}", restarts)
         self._node.set_state(account.state, account.reason)
         self._node.wait(0.0)
+
+    def _answer_voice(self, query: Query) -> list[tuple[str, Message]]:
+        """Start a newcomer of a stage (`?op=start;stage=NAME`, settings as payload), stop it, or say how it fares (no `op`)."""
+        assert self._node is not None
+        check_names(query.parameters, ("op", "stage"))
+        op, stage = query.parameters.get("op", ""), query.parameters.get("stage", "")
+        if op == "start":
+            instance = self._newcomers.start(stage, settings_of(query.payload), ROUTER)
+        elif op == "stop":
+            instance = self._newcomers.stop(stage, self._node.alive_processes())
+        elif op:
+            raise Refused(f"op: '{op[:40]}' is none of start, stop")
+        else:
+            instance = self._newcomers.instance(stage)
+        name, me = self._node.producer
+        told = Voice(stamp_ns=self._node.now_ns(), stage=name, instance=me, state="stands_by", other=instance)
+        return [(topics.VOICE.key(self.options.robot, stage=name, id=me), told)]
 
     def _note_held(self) -> None:
         self._leftovers.note(set(self.supervisor.running().values()), locked_inodes())
@@ -222,6 +245,8 @@ class Host:
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
         self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
+        voice = {"stage": topics.SUPERVISOR, "id": self._node.producer.instance}
+        self._node.serve_get(topics.VOICE, self._answer_voice, **voice)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
