@@ -5,12 +5,16 @@ SITE ?=
 DEMO_RECORDING := out/demo/pointing.mcap
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
+LINEUP ?= classic
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2 calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
+# Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
+MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
+GUESTS := .venv/guests/mediapipe
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup rerun demo view test check bench contract references pages docs zenohd clean
+.PHONY: setup guests rerun demo view test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -23,16 +27,32 @@ setup: .venv/.installed
 	@$(PIP) --no-build-isolation $(foreach d,$(DISTRIBUTIONS),-e $(d))
 	@touch $@
 
+# Stages made with MediaPipe, in an environment of their own within .venv (430 MB). Their libraries are installed as listed, see
+# guests/constraints.txt; the last line holds that they load.
+guests: setup $(GUESTS)/.installed
+
+$(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests/%/pyproject.toml,$(MEDIAPIPE))
+	@echo "setting up the guests on MediaPipe (about a minute) ..."
+	@$(PYTHON) -m venv $(GUESTS)
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r guests/constraints.txt
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt hatchling editables
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-build-isolation -e schemas -e runtime
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		$(patsubst %,-e guests/%,$(MEDIAPIPE))
+	@$(GUESTS)/bin/python -c "from mediapipe.solutions import face_detection, face_mesh, hands"
+	@touch $@
+
 # The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]
-demo: setup
+# With guests in the place of our stages: make demo LINEUP=mediapipe
+demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
-		--registry $$registry --expect P3 --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
+		--registry $$registry --expect P3 --lineup "$(LINEUP)" --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
 		printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status
 else
 	@echo "To see it while it runs, from another terminal: make rerun, once, then $(BIN)/deixis view --robot demo (or with --web)"
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
-	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run "$$@"
+	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run --lineup "$(LINEUP)" "$$@"
 endif
 
 # What the last 'make demo' did, in pictures: in a window, or with WEB=1 as a page for this machine's browsers
@@ -54,7 +74,7 @@ test: setup check
 	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES) $(foreach g,$(MEDIAPIPE),guests/$(g)/deixis_$(g))
 	@for tools in bench fitting docs; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup

@@ -36,6 +36,7 @@ LONGEST_FIRST = (
     "test_cli_system.py",
     "test_registry_service.py",
     "test_ros2.py",
+    "test_guests_mediapipe.py",
 )
 
 

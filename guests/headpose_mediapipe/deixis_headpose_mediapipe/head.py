@@ -1,0 +1,44 @@
+"""What is said of one head, look by look. Pure."""
+
+from __future__ import annotations
+
+from deixis_schemas.anatomy import FACE_WIDTH_M
+from deixis_schemas.messages import HeadPose
+
+from .angles import HeadSight, sigma_deg
+from .config import HeadposeConfig
+
+MAX_FACE_PX = 8192.0
+
+
+class Head:
+    """One person's head. A yaw is told when some looks in a row agree: a mesh that comes back from a profile slips at first."""
+
+    def __init__(self, person_id: int, config: HeadposeConfig) -> None:
+        self._person_id = person_id
+        self._config = config
+        self._yaw_deg: float | None = None
+        self._agreed = 0
+        self._was_read = False
+
+    def look(self, sight: HeadSight | None, focal_px: float) -> HeadPose:
+        """The answer to the next look, through a lens of that focal length; `sight` is none where no face was read."""
+        if sight is None:
+            self._yaw_deg, self._agreed = None, 0
+            return HeadPose(person_id=self._person_id, status="lost" if self._was_read else "initialising")
+        near = self._yaw_deg is None or abs(sight.yaw_deg - self._yaw_deg) <= self._config.jump_deg
+        self._agreed = self._agreed + 1 if near else 1
+        self._yaw_deg = sight.yaw_deg
+        if self._agreed < self._config.looks_to_start:
+            return HeadPose(person_id=self._person_id, status="lost" if self._was_read else "initialising")
+        self._was_read = True
+        width = focal_px * FACE_WIDTH_M / sight.distance_m
+        told = {"person_id": self._person_id, "face_width_px": width if 0 < width <= MAX_FACE_PX else None}
+        if abs(sight.yaw_deg) > self._config.reach_deg:
+            side = "left" if sight.yaw_deg > 0 else "right"
+            return HeadPose.model_validate(
+                {**told, "status": "out_of_range", "side": side, "beyond_deg": self._config.reach_deg}
+            )
+        return HeadPose.model_validate(
+            {**told, "status": "tracking", "yaw_deg": sight.yaw_deg, "yaw_sigma_deg": sigma_deg(sight.yaw_deg)}
+        )
