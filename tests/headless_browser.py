@@ -31,18 +31,18 @@ ANSWER_S = 120.0
 
 
 class Page:
-    """One page of a browser. said: what it wrote to its console."""
+    """One page of a browser."""
 
     def __init__(self, to: int, from_: int) -> None:
         self._asked: dict[str, str] = {}
-        self.said: list[str] = []
         self._to, self._from = to, from_
         self._number = 0
         self._bytes = b""
         self._session: str | None = None
         target = self._ask("Target.createTarget", url="about:blank")["targetId"]
         self._session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Network", "Page", "Log", "Runtime"):
+        # Not its console: Rerun's page writes megabytes there.
+        for domain in ("Network", "Page"):
             self._ask(f"{domain}.enable")
 
     @property
@@ -96,10 +96,6 @@ class Page:
             self._asked[params["requestId"]] = urlsplit(params["request"]["url"]).netloc
         elif method == "Network.loadingFailed" and params.get("blockedReason") == "csp":
             self._asked.pop(params["requestId"], None)  # the browser did not let it go out
-        elif method == "Log.entryAdded":
-            self.said.append(params["entry"]["text"])
-        elif method == "Runtime.consoleAPICalled":
-            self.said.append(" ".join(str(item.get("value", "")) for item in params["args"]))
 
 
 @contextmanager
