@@ -2,14 +2,19 @@
 PYTHON ?= python3.11
 SOURCE ?=
 SITE ?=
+DEMO_RECORDING := out/demo/pointing.mcap
 export DEMO_SOURCE = $(value SOURCE)
 export DEMO_SITE = $(value SITE)
+LINEUP ?= classic
 BIN := .venv/bin
-DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance bridges/ros2
+DISTRIBUTIONS := schemas runtime services/camera services/tracker services/headpose services/gesture services/fusion cli evaluation simulation conformance view bridges/ros2 calibration
 PACKAGES := $(foreach d,$(DISTRIBUTIONS),$(d)/deixis_$(notdir $(d)))
+# Guests in Python, each a distribution; all of MediaPipe in one environment of its own, for they need the same.
+MEDIAPIPE := tracker_mediapipe headpose_mediapipe gesture_mediapipe
+GUESTS := .venv/guests/mediapipe
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: setup demo test check bench contract references pages docs zenohd clean
+.PHONY: setup guests rerun demo view test check bench contract references pages docs zenohd clean
 setup: .venv/.installed
 
 .venv/.installed: constraints.txt requirements-dev.txt $(addsuffix /pyproject.toml,$(DISTRIBUTIONS))
@@ -22,22 +27,54 @@ setup: .venv/.installed
 	@$(PIP) --no-build-isolation $(foreach d,$(DISTRIBUTIONS),-e $(d))
 	@touch $@
 
+# Stages made with MediaPipe, in an environment of their own within .venv (430 MB). Their libraries are installed as listed, see
+# guests/constraints.txt; whether they load is tried before the guests themselves come.
+guests: setup $(GUESTS)/.installed
+
+$(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests/%/pyproject.toml,$(MEDIAPIPE))
+	@echo "setting up the guests on MediaPipe (about a minute) ..."
+	@$(PYTHON) -m venv $(GUESTS)
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r guests/constraints.txt
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt hatchling editables
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-build-isolation -e schemas -e runtime
+	@$(GUESTS)/bin/python -c "from mediapipe import solutions as s; s.face_detection, s.face_mesh, s.hands"
+	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		$(patsubst %,-e guests/%,$(MEDIAPIPE))
+	@touch $@
+
 # The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]
-demo: setup
+# With guests in the place of our stages: make demo LINEUP=mediapipe
+demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
-		--registry $$registry --expect P3; status=$$?; rm -f $$registry*; exit $$status
+		--registry $$registry --expect P3 --lineup "$(LINEUP)" --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
+		printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status
 else
+	@echo "To see it while it runs, from another terminal: make rerun, once, then $(BIN)/deixis view --robot demo (or with --web)"
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.
-	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run "$$@"
+	@set -- "$$DEMO_SOURCE"; [ -z "$$DEMO_SITE" ] || set -- "$$@" --site "$$DEMO_SITE"; exec $(BIN)/deixis run --lineup "$(LINEUP)" "$$@"
 endif
+
+# What the last 'make demo' did, in pictures: in a window, or with WEB=1 as a page for this machine's browsers
+WEB ?=
+view: rerun
+	@[ -f $(DEMO_RECORDING) ] || $(MAKE) --no-print-directory demo
+	@$(BIN)/deixis view $(DEMO_RECORDING) --site examples/pointing.yaml --pictures examples/pointing.mp4 $(if $(WEB),--web)
+
+# The viewer's library, which is large: whoever wants to see has it installed, and nobody else waits for it.
+rerun: .venv/.rerun
+
+.venv/.rerun: .venv/.installed view/pyproject.toml
+	@echo "installing Rerun (660 MB) ..."
+	@$(PIP) --no-build-isolation -e 'view[rerun]'
+	@touch $@
 
 test: setup check
 	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
 	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES) $(foreach g,$(MEDIAPIPE),guests/$(g)/deixis_$(g))
 	@for tools in bench fitting docs; do MYPYPATH=$$tools $(BIN)/mypy $$tools/*.py || exit 1; done
 
 bench: setup

@@ -2,6 +2,8 @@
 
 It estimates coarsely: hair is darker than skin, and shows on the side of the face box that the face has turned from. How far
 the dark moves from where it was in a person's first frames gives the yaw; people are taken to begin facing the camera.
+
+With DEIXIS_STAND_BY=1 it comes up unheard, and `deixis swap` gives it the place of the stage that runs.
 """
 
 import argparse
@@ -15,6 +17,7 @@ from collections import defaultdict
 
 import numpy as np
 import zenoh
+from changing_places import Place
 from deixis_runtime.age import RelativeAge
 from deixis_runtime.images import decode_image
 from deixis_schemas import Producer, codec, topics
@@ -96,10 +99,18 @@ def main():
         tracks = session.declare_subscriber(topics.TRACKS.key(given.robot), zenoh.handlers.RingChannel(1))
         infos = session.declare_subscriber(topics.CAMERA_INFO.key(given.robot), zenoh.handlers.RingChannel(1))
         poses = session.declare_publisher(topics.HEAD_POSES.key(given.robot), encoding=codec.encoding_of(HeadPoses))
-        alive = session.liveliness().declare_token(topics.alive_key(given.robot, *producer))
+        aside = session.declare_publisher(
+            topics.standby_key(topics.HEAD_POSES, given.robot), encoding=codec.encoding_of(HeadPoses)
+        )
+        place = Place(session, given.robot, producer, stands_by=os.environ.get("DEIXIS_STAND_BY", "") not in ("", "0"))
         print(f"swap_headpose: alive as {producer.instance}", flush=True)
         held, first, run, age, lockstep = {}, defaultdict(list), None, RelativeAge(), False
-        while alive and not stopping:
+        # It is published on change only; who comes later asks for it.
+        for reply in session.get(topics.CAMERA_INFO.key(given.robot), timeout=1.0):
+            if reply.ok is not None and (info := read(topics.CAMERA_INFO, reply.ok)) is not None:
+                lockstep = info.lockstep
+        while not (stopping or place.leaving):
+            place.answer_questions()
             sample = tracks.try_recv()
             if sample is None:
                 time.sleep(0.002)  # and not `recv`: while that waits, no signal is heard
@@ -124,7 +135,8 @@ def main():
             picture = decode_image(frame)  # bgr8, mono8, or over a link jpeg
             faces = {track.person_id: track for track in seen.tracks if track.kind == "face" and track.person_id is not None}
             found = [head_pose(who, dark_offset(picture, face.bbox_px), first[who]) for who, face in faces.items()]
-            poses.put(codec.encode(HeadPoses.derive(seen, producer, poses=found)))
+            out = poses if place.is_ours(seen.frame_id) else aside
+            out.put(codec.encode(HeadPoses.derive(seen, producer, poses=found)))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ LONGEST_FIRST = (
     "test_gesture_rust.py",
     "test_compose.py",
     "test_rehearsal.py",
+    "test_view.py",
     "test_two_hosts.py",
     "test_link.py",
     "test_supervision_faults.py",
@@ -35,6 +36,7 @@ LONGEST_FIRST = (
     "test_cli_system.py",
     "test_registry_service.py",
     "test_ros2.py",
+    "test_guests_mediapipe.py",
 )
 
 

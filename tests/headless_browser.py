@@ -1,77 +1,74 @@
-"""A real browser without a window, driven by its DevTools protocol over a pipe: no driver of its own, no port, no library."""
+"""A real browser without a screen, told what to do over a pipe: Debian's chromium, which draws by SwiftShader, with no GPU."""
 
 from __future__ import annotations
 
 import base64
+import fcntl
 import json
 import os
 import select
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
+import cv2
+import numpy as np
 import pytest
 
-PATIENCE_S = 30.0
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-OPTIONS = (
-    "--headless=new",
-    "--remote-debugging-pipe",
-    "--no-sandbox",  # in a container or as root there is none to be had; it opens our own page only
-    "--disable-gpu",
-    "--disable-dev-shm-usage",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--no-first-run",
-    "--hide-scrollbars",
+CHROMIUM = shutil.which("chromium")
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here (apt install chromium)")
+FLAGS = (
+    *("--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions"),
+    *("--remote-debugging-pipe", "--hide-scrollbars"),
 )
-# The browser reads from file 3 and writes to file 4, which here are others.
-EXEC = "import os, sys; r, w = map(int, sys.argv[1:3]); os.dup2(r, 103); os.dup2(w, 104); os.dup2(103, 3); os.dup2(104, 4); "
-EXEC += "os.execv(sys.argv[3], sys.argv[3:])"
+ANSWER_S = 120.0
+PATIENCE_S = 30.0
 
 
-class Browser:
+class Page:
     """One page of a browser."""
 
-    def __init__(self, into: int, out: int) -> None:
-        self._into = into
-        self._out = out
-        self._buffer = b""
+    def __init__(self, to: int, from_: int) -> None:
+        self._asked: dict[str, str] = {}
+        self._to, self._from = to, from_
         self._number = 0
+        self._bytes = b""
         self._session: str | None = None
         self.errors: list[str] = []
+        target = self._ask("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        # Not its console: Rerun's page writes megabytes there.
+        for domain in ("Network", "Page"):
+            self._ask(f"{domain}.enable")
 
-    def open(self, url: str, width: int = 1280, height: int = 800) -> None:
-        """Open an address in a new page of this size."""
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log"):
-            self.call(f"{domain}.enable")
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
-        self.call("Page.navigate", url=url)
+    @property
+    def hosts(self) -> set[str]:
+        """`host:port` of all that the page has asked for anything."""
+        return set(self._asked.values())
 
-    def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """Call a method of the protocol; its result. What the page complains of meanwhile is kept in `errors`."""
-        self._number += 1
-        message = {"id": self._number, "method": method, "params": params}
-        if self._session is not None:
-            message["sessionId"] = self._session
-        os.write(self._into, json.dumps(message).encode() + b"\0")
-        while True:
-            answer = self._next(method)
-            if answer.get("id") == self._number:
-                assert "error" not in answer, f"{method}: {answer.get('error')}"
-                return dict(answer["result"])
-            self._note(answer)
+    def open(self, url: str) -> None:
+        """Go there."""
+        self._ask("Page.navigate", url=url)
+
+    def look(self) -> np.ndarray:
+        """What is to be seen, BGR."""
+        png = base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
+        return cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+
+    def note_errors(self) -> None:
+        """From now on keep in `errors` what the page's script throws and what the browser forbids it."""
+        for domain in ("Runtime", "Log"):
+            self._ask(f"{domain}.enable")
 
     def run(self, script: str) -> Any:
         """The value of an expression on the page."""
-        result = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        result = self._ask("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
@@ -80,7 +77,7 @@ class Browser:
         deadline_s = time.monotonic() + PATIENCE_S
         while not (value := self.run(script)):
             assert time.monotonic() < deadline_s, f"not within {PATIENCE_S:g} s: {script}; {self.errors}\n{self.text()}"
-            time.sleep(0.05)
+            self.wait(0.05)
         return value
 
     def text(self) -> str:
@@ -88,11 +85,11 @@ class Browser:
         return str(self.run("document.body.innerText"))
 
     def mouse(self, kind: str, x: float, y: float) -> None:
-        """One event of the left button: mousePressed, mouseMoved or mouseReleased."""
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+        """One event of the left button at a pixel of the page: mousePressed, mouseMoved or mouseReleased."""
+        self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def click(self, x: float, y: float) -> None:
-        """Click at a place of the page, pixels."""
+        """Click there."""
         self.mouse("mousePressed", x, y)
         self.mouse("mouseReleased", x, y)
 
@@ -107,60 +104,83 @@ class Browser:
         """Replace what stands in a field, as by typing."""
         self.run(f"document.querySelector({json.dumps(selector)}).select()")
         self.run(f"document.querySelector({json.dumps(selector)}).focus()")
-        self.call("Input.insertText", text=text)
+        self._ask("Input.insertText", text=text)
 
     def press(self, selector: str) -> None:
         """Press a button."""
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 
-    def picture(self, path: Path) -> None:
-        """What the page looks like, as PNG."""
-        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+    def wait(self, seconds: float) -> None:
+        """Let the page go on, and hear what it does."""
+        deadline_s = time.monotonic() + seconds
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            self._hear(left_s)
 
-    def _note(self, event: dict[str, Any]) -> None:
-        params = event.get("params", {})
-        if event.get("method") == "Runtime.exceptionThrown":
+    def _ask(self, method: str, **params: Any) -> dict[str, Any]:
+        self._number += 1
+        call = {"id": self._number, "method": method, "params": params}
+        if self._session:
+            call["sessionId"] = self._session
+        os.write(self._to, json.dumps(call).encode() + b"\0")
+        deadline_s = time.monotonic() + ANSWER_S
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            for message in self._hear(left_s):
+                if message.get("id") == self._number:
+                    assert "error" not in message, f"{method}: {message['error']}"
+                    return message["result"]
+        raise TimeoutError(f"the browser did not answer {method} within {ANSWER_S:.0f} s")
+
+    def _hear(self, timeout_s: float) -> list[dict[str, Any]]:
+        if not select.select([self._from], [], [], timeout_s)[0]:
+            return []
+        data = os.read(self._from, 1 << 20)
+        if not data:
+            raise ConnectionError("the browser is gone")
+        *whole, self._bytes = (self._bytes + data).split(b"\0")
+        messages = [json.loads(text) for text in whole]
+        for message in messages:
+            self._note(message.get("method"), message.get("params", {}))
+        return messages
+
+    def _note(self, method: str | None, params: dict[str, Any]) -> None:
+        if method == "Network.requestWillBeSent" and params["request"]["url"].startswith("http"):
+            self._asked[params["requestId"]] = urlsplit(params["request"]["url"]).netloc
+        elif method == "Network.loadingFailed" and params.get("blockedReason") == "csp":
+            self._asked.pop(params["requestId"], None)  # the browser did not let it go out
+        elif method == "Runtime.exceptionThrown":
             self.errors.append(str(params["exceptionDetails"].get("exception", params).get("description", params)))
-        # A request that is refused, as a test has it refused, is no fault of the page.
-        elif event.get("method") == "Log.entryAdded" and (params["entry"]["level"], params["entry"]["source"]) != (
-            "error",
-            "network",
-        ):
+        elif method == "Log.entryAdded" and params["entry"]["level"] == "error" and params["entry"]["source"] != "network":
+            # A request that is refused, as a test has it refused, is no fault of the page.
             self.errors.append(f"{params['entry']['text']} {params['entry'].get('url', '')}")
-
-    def _next(self, waits_for: str) -> dict[str, Any]:
-        deadline_s = time.monotonic() + PATIENCE_S
-        while b"\0" not in self._buffer:
-            ready, _, _ = select.select([self._out], [], [], max(0.0, deadline_s - time.monotonic()))
-            assert ready, f"the browser does not answer {waits_for}"
-            read = os.read(self._out, 1 << 20)
-            assert read, f"the browser ended while it was asked for {waits_for}"
-            self._buffer += read
-        message, _, self._buffer = self._buffer.partition(b"\0")
-        return dict(json.loads(message))
 
 
 @contextmanager
-def browser(folder: Path) -> Iterator[Browser]:
-    """A browser with its profile in `folder`; skips the test where none is installed."""
-    program = next((found for name in NAMES if (found := shutil.which(name))), None)
-    if program is None:
-        pytest.skip("no browser is installed (on Debian: apt install chromium)")
-    reads, into = os.pipe()
-    out, writes = os.pipe()
-    argv = [sys.executable, "-c", EXEC, str(reads), str(writes), program, *OPTIONS, f"--user-data-dir={folder}"]
-    with (folder.parent / "browser.log").open("wb") as log:
-        child = subprocess.Popen(argv, pass_fds=(reads, writes), stdin=subprocess.DEVNULL, stdout=log, stderr=log)
-    os.close(reads)
-    os.close(writes)
+def page(folder: Path, size: tuple[int, int], *flags: str) -> Iterator[Page]:
+    """A browser with one page of this size; its profile lies in `folder`."""
+    to_child, to = os.pipe()
+    from_, from_child = os.pipe()
+    # Out of the way of 3 and 4, which the browser reads and writes. A shell lays them there: what Python runs between fork and
+    # exec is unsafe with threads.
+    ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 100) for end in (to_child, from_child)]
+    os.close(to_child)
+    os.close(from_child)
+
+    argv = [CHROMIUM, *FLAGS, f"--window-size={size[0]},{size[1]}", f"--user-data-dir={folder / 'profile'}", *flags]
+    with (folder / "browser.log").open("ab") as log:
+        child = subprocess.Popen(
+            ["bash", "-c", f'exec "$@" 3<&{ends[0]} 4>&{ends[1]}', "bash", *argv],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, pass_fds=ends, start_new_session=True,
+        )  # fmt: skip
+    for end in ends:
+        os.close(end)
     try:
-        yield Browser(into, out)
+        yield Page(to, from_)
     finally:
-        os.close(into)
         child.terminate()
         try:
             child.wait(10)
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
-        os.close(out)
+        os.close(to)
+        os.close(from_)

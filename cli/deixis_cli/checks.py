@@ -83,6 +83,8 @@ def hung_stages(system: System) -> Iterator[Finding]:
                 f"{process.name}: alive but gives no answer",
                 "it hangs or is stopped (SIGSTOP): restart it; or access control denies gets on its health key",
             )
+        elif standing == "stands by":
+            yield Finding("note", f"{process.name}: stands by, as before and after a hot swap: it works and is not heard")
         elif standing == "no token":
             yield Finding("note", f"{process.name}: answers but holds no liveliness token")
 
@@ -305,4 +307,5 @@ def registry(state: State | None) -> Iterator[Finding]:
 def _settled(system: System, stage: str) -> list[Health]:
     """Health of a stage's processes that are past their start."""
     processes: list[StageProcess] = [process for process in system.processes if process.stage == stage]
-    return [process.health for process in processes if process.health and process.health.uptime_s >= SETTLED_S]
+    heard = [process.health for process in processes if process.health and not process.health.standing_by]
+    return [health for health in heard if health.uptime_s >= SETTLED_S]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Callable, Iterable
+from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any
 
 import zenoh
 from deixis_runtime.certificate_check import read, who_may_not_edit
 from deixis_runtime.certificates import certificates_of
 from deixis_runtime.endpoint import is_guarded
-from deixis_runtime.finding import Finding
+from deixis_runtime.finding import CAMERA_LOOKS, CameraLook, Finding
 from deixis_runtime.session import Unreachable, open_client
 from deixis_runtime.unanswered import why_unanswered
 from deixis_schemas import topics
@@ -24,7 +27,7 @@ from .checks import Listening, findings
 from .gets import get_all
 from .inbox import Inbox
 from .local import examine_machine
-from .options import add_connect, add_json, add_robot
+from .options import CommandError, add_connect, add_json, add_robot
 from .system import look
 
 LISTEN_S = 2.5
@@ -42,19 +45,42 @@ def register(subparsers: Any) -> None:
     add_json(parser, "print one JSON document")
     parser.add_argument("--source", metavar="SOURCE", help="also open this camera, file or stream here, and take a picture")
     parser.add_argument("--local", action="store_true", help="look at this machine only, at no router")
+    parser.add_argument(
+        "--camera",
+        nargs="?",
+        type=Path,
+        const=Path("camera.png"),
+        metavar="FILE.png",
+        help="look through the robot's camera, or --source, and draw what the tracker sees (default: camera.png; written over)",
+    )
     parser.set_defaults(run=run)
 
 
 def run(given: argparse.Namespace) -> int:
-    """Examine the system and this machine. 1 when something is wrong."""
+    """Examine the system and this machine. 1 when something is wrong. Raises CommandError."""
+    looks = camera_looks(given)
     found = [] if given.local else examine(given.connect, given.robot)
     found += examine_machine(given.source)
+    for look_through in looks:
+        found += look_through(CameraLook(given.source, given.robot, given.connect, given.camera))
     wrong = [finding for finding in found if finding.level == "wrong"]
     if given.json:
         print(json.dumps({"robot": given.robot, "wrong": len(wrong), "findings": [vars(finding) for finding in found]}))
     else:
         _print(found)
     return 1 if wrong else 0
+
+
+def camera_looks(given: argparse.Namespace) -> list[Callable[[CameraLook], Iterable[Finding]]]:
+    """What examines a camera's pictures, where --camera is given. Raises CommandError where that cannot be done."""
+    if given.camera is None:
+        return []
+    if given.local and given.source is None:
+        raise CommandError("--camera with --local needs --source: no system is asked for its frames")
+    looks = [point.load() for point in entry_points(group=CAMERA_LOOKS)]
+    if not looks:
+        raise CommandError("--camera: needs the distribution deixis-calibration, which is not installed here")
+    return looks
 
 
 def examine(endpoint: str, robot: str) -> list[Finding]:

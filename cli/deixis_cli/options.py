@@ -10,6 +10,7 @@ from pathlib import Path
 from deixis_runtime.certificates import add_certificates, certificates_of
 from deixis_runtime.endpoint import NotAnEndpoint, read_endpoint
 from deixis_runtime.host import SOURCE, HostOptions, chosen_stages, known_stages
+from deixis_runtime.lineups import CLASSIC, LINEUPS, LineupError, guests_of
 from deixis_runtime.link_security import LinkSecurity
 from deixis_runtime.session import DEFAULT_ENDPOINT
 from deixis_runtime.settings import checked_name
@@ -77,12 +78,31 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         metavar="STAGE.NAME=VALUE",
         help="override a setting, e.g. camera.encoding=jpeg; may be given again",
     )
+    add_lineup(parser)
     parser.add_argument("--registry", type=Path, metavar="FILE", help="SQLite file of the points of interest")
     parser.add_argument(
         "--no-fork",
         action="store_true",
         help="start each process from nothing, not forked from one that has done the imports: more memory, slower",
     )
+
+
+def add_lineup(parser: argparse.ArgumentParser) -> None:
+    """--lineup."""
+    parser.add_argument(
+        "--lineup",
+        default=CLASSIC,
+        metavar="NAME",
+        help=f"guests in the place of stages ('make guests' installs them): {', '.join(LINEUPS)} (default: %(default)s)",
+    )
+
+
+def read_lineup(name: str) -> dict[str, str]:
+    """The guests of a line-up, by stage. Raises CommandError."""
+    try:
+        return guests_of(name)
+    except LineupError as error:
+        raise CommandError(str(error)) from None
 
 
 def host_options(given: argparse.Namespace, source: dict[str, str] | None = None, **others: object) -> HostOptions:
@@ -122,6 +142,7 @@ def host_options(given: argparse.Namespace, source: dict[str, str] | None = None
         sets=sets,
         security=security,
         fork=not given.no_fork,
+        guests={stage: guest for stage, guest in read_lineup(given.lineup).items() if stage in stages},
         **others,  # type: ignore[arg-type]
     )
 

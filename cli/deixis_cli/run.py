@@ -19,7 +19,9 @@ from . import wording
 from .live_view import view_for
 from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site, seconds
 from .play import PlayResult, play
+from .shown import show_by_all
 from .source import Source, read_source
+from .views import file_view
 
 EXPECTED_MISSED = 1
 ENOUGH_ANSWERED = 0.8
@@ -36,6 +38,9 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--lockstep", action="store_true", help="feed a frame when the last is answered: reproducible")
     parser.add_argument("--loop", action="store_true", help="play a file again and again")
     add_out(parser)
+    parser.add_argument(
+        "--view", type=Path, metavar="FILE.rrd", help="draw the run into a file for Rerun's viewer, with the pictures"
+    )
     parser.add_argument("--expect", metavar="POI_ID", help="succeed only if the single final answer is exactly this POI")
     parser.add_argument("--timeout", type=seconds, metavar="SECONDS", help="give up when the source has not ended by then")
     add_json(parser, "print one JSON document at the end, and nothing before")
@@ -64,7 +69,8 @@ def out_options(given: argparse.Namespace, name: str, played: Path | None = None
         if played is not None and mcap.samefile(played):
             raise CommandError(f"'{mcap}' is what is to be played, and would be written over; give another --out")
         _remove(mcap)
-    return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
+    show = None if mcap is None else show_by_all(given.site)
+    return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures, "show": show}
 
 
 def _remove(mcap: Path) -> None:
@@ -78,6 +84,7 @@ def run(given: argparse.Namespace) -> int:
     """Play SOURCE. 0 when done (for live sources and --loop also on Ctrl-C), 1 with the cause, 130 on Ctrl-C before the end."""
     source = read_source(given.source)
     options, names = _options(given, source)
+    drawn = None if given.view is None else file_view(given.view, given.site, given.robot)
     # What is worth reading of the stages' own logs is shown by the view; they still report what is wrong.
     os.environ.setdefault("DEIXIS_LOG", "WARNING")
     console = Console()
@@ -87,6 +94,7 @@ def run(given: argparse.Namespace) -> int:
             options,
             **out_options(given, source.name),
             on_message=shown.hear if shown else None,
+            beside=drawn,
             timeout_s=given.timeout,
         )
     names |= result.names

@@ -18,7 +18,7 @@ from .system import HEARD_ONLY, StageProcess, Standing, System, look
 
 CPU_OVER_S = 0.5
 PLAIN_WIDTH = 180
-STYLES = {"ok": "green", "heard": "green", "degraded": "yellow"}
+STYLES = {"ok": "green", "heard": "green", "stands by": "cyan", "degraded": "yellow"}
 UNANSWERED = {"heard": HEARD_ONLY, "hung": "its process is alive but gives no answer: hung or stopped"}
 
 

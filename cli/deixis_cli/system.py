@@ -17,7 +17,7 @@ from .gets import Refusal, TimedHealth, get_all, get_state, get_timed_healths
 
 TOKENS_TIMEOUT_S = 2.0
 
-Standing = Literal["ok", "degraded", "failed", "heard", "hung", "no token"]
+Standing = Literal["ok", "degraded", "failed", "heard", "hung", "no token", "stands by"]
 HEARD_ONLY = "its messages are heard, but it answers no get of its health"
 
 
@@ -63,22 +63,27 @@ class System:
     def standing(self, process: StageProcess) -> Standing:
         """What the stage says, or that it says nothing (`hung`), or that it has no token (not one of the runtime's).
 
+        One that stands by, before or after a hot swap, works and is not heard.
+
         A stage of one's own need not give health: while its messages come it is `heard`.
         """
         if process.health is None:
             return "heard" if process.name in self.heard() else "hung"
+        if process.health.standing_by:
+            return "stands by"
         return process.health.state if process.alive else "no token"
 
     def missing(self) -> list[str]:
         """Stages of the contract without a process."""
-        present = {process.stage for process in self.processes}
+        present = {process.stage for process in self.processes if not (process.health and process.health.standing_by)}
         return [stage for stage in topics.STAGES if stage not in present]
 
     def doubled(self) -> list[str]:
         """Keys with more than one producer, as sentences."""
         found: dict[str, set[str]] = {}
         for process in self.processes:
-            found.setdefault(f"stage {process.stage}", set()).add(process.name)
+            if process.health is None or not process.health.standing_by:
+                found.setdefault(f"stage {process.stage}", set()).add(process.name)
             for item in process.health.inputs if process.health else []:
                 found.setdefault(f"key {item.key}", set()).update(item.producers)
         return [f"{what} has {len(who)} producers: {', '.join(sorted(who))}" for what, who in found.items() if len(who) > 1]

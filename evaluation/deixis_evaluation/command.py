@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from deixis_cli.options import CommandError, stage_settings
+from deixis_cli.options import CommandError, add_lineup, read_lineup, stage_settings
 from deixis_runtime.host import chosen_stages
+from deixis_runtime.lineups import CLASSIC
 from rich.console import Console
 
 from .chosen_clips import Choice, Chosen, choose
@@ -65,6 +66,7 @@ def register(subparsers: Any) -> None:
         metavar="STAGES",
         help="the labels answer in place of these stages: headpose, gesture, tracker, or some of them with commas",
     )
+    add_lineup(parser)
     parser.add_argument("--lockstep", action="store_true", help="feed a frame when the last is answered: reproducible")
     parser.add_argument(
         "--out",
@@ -97,6 +99,8 @@ def run(given: argparse.Namespace) -> int:
         raise CommandError("--video: draws tracks, and goes with --stage tracker")
     if given.stage is None:
         return _run_system(given)
+    if given.lineup != CLASSIC:
+        raise CommandError("--lineup: guests are processes, and --stage scores our own core without the system")
     return RUNS_ALONE[given.stage](given)
 
 
@@ -105,7 +109,8 @@ def _run_system(given: argparse.Namespace) -> int:
     sets = stage_settings(given.sets)
     chosen = _choose(given)
     check_writable(given.json)
-    options = EvaluationOptions(stages, given.truth, given.lockstep, given.out, sets)
+    guests = {stage: guest for stage, guest in read_lineup(given.lineup).items() if stage in stages}
+    options = EvaluationOptions(stages, given.truth, given.lockstep, given.out, sets, guests=guests)
     blind = say_blind(chosen.clips, given.truth)
     if blind is not None:
         print(f"deixis eval: {blind}", file=sys.stderr)

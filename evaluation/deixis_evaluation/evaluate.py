@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,7 +30,7 @@ class EvaluationOptions:
     """How clips are played. `stages` are those that run, `truth` those in whose place the truth speaks.
 
     `out` is the folder that gets NAME.jsonl, `sets` are settings of stages. `site`: a site file to play clips with, in place of
-    one made from the truth; `sets` then name source and registry.
+    one made from the truth; `sets` then name source and registry. guests: who stands in the place of stages (`lineups`).
     """
 
     stages: tuple[str, ...]
@@ -39,12 +39,19 @@ class EvaluationOptions:
     out: Path | None = None
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     site: Path | None = None
+    guests: Mapping[str, str] = field(default_factory=dict)
 
 
-def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[], None] | None = None) -> ClipScore:
-    """Play one clip and score it; `on_frame` is called for each frame answered. Raises Interrupted.
+def evaluate_clip(
+    clip: Clip,
+    options: EvaluationOptions,
+    on_frame: Callable[[], None] | None = None,
+    on_message: Callable[[Message], None] | None = None,
+) -> ClipScore:
+    """Play one clip and score it. Raises Interrupted.
 
-    What goes wrong with the clip stands in the score's `failure`.
+    `on_frame` is called for each frame answered, `on_message` for each message, without its image bytes. What goes wrong with
+    the clip stands in the score's `failure`.
     """
     # A folder directly below the system's temporary one: the POI registry is made anew for each clip.
     with tempfile.TemporaryDirectory(prefix="deixis-eval-") as folder:
@@ -54,7 +61,7 @@ def evaluate_clip(clip: Clip, options: EvaluationOptions, on_frame: Callable[[],
             speakers = Speakers(speakers_for(clip, options.truth, lockstep=options.lockstep), ROBOT, lockstep=options.lockstep)
         except ClipError as error:
             return failed_clip(clip.name, clip.truth, str(error))
-        result = _play(clip, site, out, options, speakers, on_frame)
+        result = _play(clip, site, out, options, speakers, on_frame, on_message)
         if result.signal is not None:
             raise Interrupted(result.signal)
         failure = result.failure or _incomplete(result) or next(iter(speakers.failures), None)
@@ -76,14 +83,23 @@ def _play(
     options: EvaluationOptions,
     speakers: Speakers,
     on_frame: Callable[[], None] | None,
+    on_message: Callable[[Message], None] | None,
 ) -> PlayResult:
     def hear(_: str, message: Message) -> None:
         speakers.hear(message)
+        if on_message is not None:
+            on_message(message)
         if on_frame is not None and isinstance(message, Belief):
             on_frame()
 
     host = HostOptions(
-        robot=ROBOT, stages=options.stages, site=site, listen=(), lockstep=options.lockstep, sets=dict(options.sets)
+        robot=ROBOT,
+        stages=options.stages,
+        site=site,
+        listen=(),
+        lockstep=options.lockstep,
+        sets=dict(options.sets),
+        guests=options.guests,
     )
     timeout_s = START_S + FRAME_S * len(clip.truth.frames)
     return play(host, out=out, name=clip.name, on_message=hear, beside=speakers.join, timeout_s=timeout_s)

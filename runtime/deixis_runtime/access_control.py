@@ -9,6 +9,8 @@ certificate. The roles, with `{robot}` their own robot and `*` any:
     viewer  sends nothing; is given all but frames. Gets on `fusion/poi` may be edits, so `fusion/state` tells viewers of POIs
     editor  as a viewer; and puts, deletes and gets on `fusion/poi`
 
+Who is heard for a stage is a matter of its own host, and of the edge: a get on `{stage}/voice/...` may be a swap.
+
 Who links through a Unix socket, or by TCP from this host itself, is not of another host, and may do all. Rules of all subjects
 that match a link add up, and what one of them allows no other can deny: so none may match a link of another role.
 """
@@ -27,7 +29,7 @@ from .access import AccessList, Member, Role
 ANY = "*"
 CAMERA = topics.FRAME.stage
 # `**` does not match chunks that begin with `@`.
-EVERYTHING = ("**", "**/@alive/**", "**/@adv/**", "@/**")
+EVERYTHING = ("**", "**/@alive/**", "**/@standby/**", "**/@adv/**", "@/**")
 DATA = ("put", "delete")
 DECLARATIONS = ("declare_subscriber", "declare_queryable")
 LIVELINESS_INTEREST = ("liveliness_query", "declare_liveliness_subscriber")
@@ -148,7 +150,8 @@ def _sends(robot: str, stages: Iterable[str], published: list[Topic]) -> list[Gr
     processes = (*stages, topics.SUPERVISOR)
     answered = [topic for topic in published if topic.queryable]
     health = tuple(topics.HEALTH.key(robot, stage=name) for name in processes)
-    alive = tuple(topics.alive_key(robot, name, ANY) for name in processes)
+    keys = (topics.alive_key, topics.standby_alive_key)
+    alive = tuple(key(robot, name, ANY) for key in keys for name in processes)
     return [
         Grant("ingress", DATA, (*_keys(robot, published), *health)),
         Grant("ingress", ("declare_queryable", "reply"), (*_keys(robot, answered), *health)),
@@ -158,10 +161,10 @@ def _sends(robot: str, stages: Iterable[str], published: list[Topic]) -> list[Gr
 
 
 def _asks(robot: str, readable: list[Topic]) -> list[Grant]:
-    """What is allowed to one who subscribes and asks. A get on a POI may be an edit."""
+    """What is allowed to one who subscribes and asks. A get on a POI may be an edit, one on a voice a swap."""
     # A wildcard that takes frames in would draw them over the link for nothing.
     wildcards = (f"deixis/{robot}/{stage}/**" for stage in topics.STAGES if stage != CAMERA)
-    answered = [topic for topic in readable if topic.queryable and topic is not topics.POI]
+    answered = [topic for topic in readable if topic.queryable and topic not in (topics.POI, topics.VOICE)]
     return [
         Grant("ingress", ("declare_subscriber",), (*_keys(robot, readable), *wildcards)),
         Grant("ingress", ("query",), _keys(robot, answered)),

@@ -76,6 +76,8 @@ class Heartbeat:
         outputs: list[Publisher],
         clocks: Sequence[ClockHealth] = (),
         router: str = "",
+        *,
+        standing_by: bool = False,
     ) -> Health:
         """The record as of now."""
         steps = self._steps.last_second_ms(time.monotonic())
@@ -100,6 +102,7 @@ class Heartbeat:
             notes=list(self.notes.values())[:16],
             versions=self._versions,
             clocks=list(clocks),
+            standing_by=standing_by,
         )
 
 

@@ -7,23 +7,27 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Self
 
 import zenoh
 from deixis_schemas import topics
+from deixis_schemas.messages import Message, Voice
 
 from .hang_watch import HangWatch
 from .launching import Forkable, ForkServer
 from .leftovers import Leftovers, remove_unused
+from .lineups import guest_command
 from .link_security import LinkSecurity, SecurityError
+from .newcomers import Newcomers, settings_of
 from .notifications import Notifications
 from .parent import SUPERVISED_BY
 from .procfs import locked_inodes
+from .queries import Query, Refused, check_names
 from .router import router_config
 from .session import DEFAULT_ENDPOINT, Unreachable, open_client
 from .settings import CommonOptions, default_instance
@@ -38,6 +42,9 @@ log = logging.getLogger("deixis-supervisor")
 POLL_S = 0.02
 START_S = 30.0
 HELD_PERIOD_S = 0.5
+GUEST_READY_S, GUEST_SILENT_S = 30.0, 3.0
+"""What is borne where guests are among the stages: their libraries take seconds to load, and one frame of a large model on a
+busy machine more than we bear of our own stages."""
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
 SOURCE = topics.FRAME.stage
@@ -52,7 +59,8 @@ class HostFailed(RuntimeError):
 class HostOptions:
     """What runs on a host, where it is reached, and how its links are guarded.
 
-    fork: its processes are forked from one that has done their imports.
+    fork: its processes are forked from one that has done their imports. guests: who stands in the place of stages, by stage
+    (`lineups`).
     """
 
     robot: str
@@ -66,6 +74,7 @@ class HostOptions:
     sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
     fork: bool = True
+    guests: Mapping[str, str] = field(default_factory=dict)
 
 
 def installed_stages() -> set[str]:
@@ -103,6 +112,7 @@ class Host:
         self._stack = ExitStack()
         self._watch: HangWatch
         self._node: Node | None = None
+        self._newcomers = Newcomers(self.supervisor, self._stage_command, default_instance)
         self._leftovers = Leftovers()
         self._held_looked_s = 0.0
         self._stopped: Callable[[], bool] = lambda: False
@@ -112,6 +122,10 @@ class Host:
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
         patience = self.options.patience
+        if self.options.guests:
+            patience = replace(
+                patience, ready_s=max(patience.ready_s, GUEST_READY_S), silent_s=max(patience.silent_s, GUEST_SILENT_S)
+            )
         notifications = self._stack.enter_context(Notifications(folder / "notify.sock", patience.silent_s))
         self._watch = HangWatch(notifications, patience)
         self.supervisor.environment = notifications.environment() | {SUPERVISED_BY: str(os.getpid())}
@@ -157,6 +171,8 @@ class Host:
             self._held_looked_s = now_s
             self._note_held()
             self._remove_leftovers()
+        if self._node is not None:
+            self._newcomers.look(self._node.alive_processes(), now_s)
         self._tell(now_s)
         failed = self.supervisor.failed()
         if ROUTER in failed or (self.options.stages and failed.keys() >= set(self.options.stages)):
@@ -174,6 +190,23 @@ class Host:
         self._node.set_state(account.state, account.reason)
         self._node.wait(0.0)
 
+    def _answer_voice(self, query: Query) -> list[tuple[str, Message]]:
+        """Start a newcomer of a stage (`?op=start;stage=NAME`, settings as payload), stop it, or say how it fares (no `op`)."""
+        assert self._node is not None
+        check_names(query.parameters, ("op", "stage"))
+        op, stage = query.parameters.get("op", ""), query.parameters.get("stage", "")
+        if op == "start":
+            instance = self._newcomers.start(stage, settings_of(query.payload), ROUTER)
+        elif op == "stop":
+            instance = self._newcomers.stop(stage, self._node.alive_processes())
+        elif op:
+            raise Refused(f"op: '{op[:40]}' is none of start, stop")
+        else:
+            instance = self._newcomers.instance(stage)
+        name, me = self._node.producer
+        told = Voice(stamp_ns=self._node.now_ns(), stage=name, instance=me, state="stands_by", other=instance)
+        return [(topics.VOICE.key(self.options.robot, stage=name, id=me), told)]
+
     def _note_held(self) -> None:
         self._leftovers.note(set(self.supervisor.running().values()), locked_inodes())
 
@@ -186,7 +219,7 @@ class Host:
     def forkables(self) -> list[Forkable]:
         """The router and our own stages, of which a test holds that their imports start no threads."""
         own = [item.name for item in entry_points(group="deixis.stages") if item.value == f"deixis_{item.name}.service:main"]
-        stages = [name for name in self.options.stages if name in own]
+        stages = [name for name in self.options.stages if name in own and name not in self.options.guests]
         return [
             Forkable(ROUTER_COMMAND, "deixis_runtime.router:main"),
             *(Forkable((str(_script(name)),), f"deixis_{name}.service:main") for name in stages),
@@ -212,6 +245,8 @@ class Host:
         self._wait_until(path.exists, lambda: {ROUTER})
         self.session = self._stack.enter_context(open_client(self.endpoint, shared_memory=False))
         self._node = Node(self.session, topics.SUPERVISOR, self._node_options(), is_stage=False)
+        voice = {"stage": topics.SUPERVISOR, "id": self._node.producer.instance}
+        self._node.serve_get(topics.VOICE, self._answer_voice, **voice)
 
     def _node_options(self) -> CommonOptions:
         options = self.options
@@ -235,9 +270,10 @@ class Host:
         return set(names) - (self._node.alive_stages() if self._node else set())
 
     def _stage_command(self, name: str) -> list[str]:
-        script = _script(name)
+        guest = self.options.guests.get(name)
+        script = guest_command(name, guest) if guest else _script(name)
         if not script.exists():
-            raise HostFailed(f"stage '{name}' is registered but its command {script.name} is not beside {sys.executable}")
+            raise HostFailed(f"stage '{name}': its command {script.name} is not in {script.parent}")
         command = [str(script), "--supervised", "--robot", self.options.robot, "--connect", self.endpoint]
         if self.options.site:
             command += ["--site", str(self.options.site)]

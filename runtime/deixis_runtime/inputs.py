@@ -6,11 +6,12 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import zenoh
 from deixis_schemas import codec
-from deixis_schemas.messages import InputHealth, Message, OfFrame, Produced
+from deixis_schemas.messages import FrameId, InputHealth, Message, OfFrame, Produced
 from deixis_schemas.topics import Topic
 
 from .age import RelativeAge
@@ -22,6 +23,24 @@ T = TypeVar("T", bound=Message)
 HEARD_WITHIN_S = 3.0
 MAX_PRODUCERS = 8
 MAX_OVERSIZED = 1024
+
+
+@dataclass
+class _Heard:
+    """A producer: when it was heard first and last (monotonic), and of which frames it spoke then."""
+
+    began_s: float
+    last_s: float
+    first: FrameId | None
+    last: FrameId | None
+
+    def ended_before(self, newer: _Heard) -> bool:
+        """Whether it was replaced by the newer one: in time or, where their messages crossed on the way, by the frames."""
+        if self.last_s < newer.began_s:
+            return True
+        if self.last is None or newer.first is None or self.last.run != newer.first.run:
+            return False
+        return self.last.seq < newer.first.seq
 
 
 class Subscription(Generic[T]):
@@ -58,7 +77,7 @@ class Subscription(Generic[T]):
         self._lock = threading.Lock()
         self._samples: deque[tuple[int, zenoh.Sample]] = deque(maxlen=depth)
         self._oversized: deque[tuple[str, int]] = deque(maxlen=MAX_OVERSIZED)
-        self._heard: dict[str, tuple[float, float]] = {}
+        self._heard: dict[str, _Heard] = {}
         self._accepted_s: float | None = None
         self._rate = Rate(time.monotonic())
         self._max_age_s = None if lockstep else topic.max_age_s
@@ -119,14 +138,15 @@ class Subscription(Generic[T]):
     def producers(self) -> list[str]:
         """`stage/instance` of those who publish here now; more than one is worth an alarm.
 
-        A producer that fell silent before the newest one began was replaced by it, as after a restart, and is left out.
+        A producer that fell silent when the newest one began was replaced by it, as after a restart or by a hot swap, and is
+        left out.
         """
         now = time.monotonic()
-        self._heard = {who: times for who, times in self._heard.items() if now - times[1] < HEARD_WITHIN_S}
+        self._heard = {who: heard for who, heard in self._heard.items() if now - heard.last_s < HEARD_WITHIN_S}
         if not self._heard:
             return []
-        newest_began = max(first for first, _ in self._heard.values())
-        return sorted(who for who, (_, last) in self._heard.items() if last >= newest_began)
+        newest = max(self._heard.values(), key=lambda heard: heard.began_s)
+        return sorted(who for who, heard in self._heard.items() if heard is newest or not heard.ended_before(newest))
 
     def health(self) -> InputHealth:
         """Counters for the health record."""
@@ -156,7 +176,7 @@ class Subscription(Generic[T]):
             return None
         self.last_error_kind = ""
         if isinstance(message, Produced):
-            self._hear(key, f"{message.stage}/{message.instance}")
+            self._hear(key, message)
         return message  # type: ignore[return-value]
 
     def _reject(self, key: str, error: codec.CodecError) -> None:
@@ -192,12 +212,13 @@ class Subscription(Generic[T]):
         by_clock_ns = None if self._clock is None else self._clock.age_ns(message.stamp_ns, now_ns)
         return max(self._age.age_s(message.stamp_ns, now_ns), (by_clock_ns or 0) / 1e9)
 
-    def _hear(self, key: str, who: str) -> None:
-        now = time.monotonic()
+    def _hear(self, key: str, message: Produced) -> None:
+        now, who = time.monotonic(), f"{message.stage}/{message.instance}"
+        frame = message.frame_id if isinstance(message, OfFrame) else None
         if who in self._heard:
-            self._heard[who] = (self._heard[who][0], now)
+            self._heard[who].last_s, self._heard[who].last = now, frame
         elif len(self._heard) < MAX_PRODUCERS:
-            self._heard[who] = (now, now)
+            self._heard[who] = _Heard(now, now, frame, frame)
         if len(self._heard) > 1 and len(producers := self.producers()) > 1:
             self._report(f"producers {key}", f"{key}: more than one producer: {', '.join(producers)}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import zenoh
 from deixis_schemas import codec
@@ -13,6 +14,14 @@ from deixis_schemas.topics import Topic
 from .delivery import PROFILES
 from .patient_puts import PatientPuts
 from .rate import Rate
+
+
+@dataclass(frozen=True)
+class Aside:
+    """Of a stage that may stand by: which messages are to be heard, and the key on which the others are said."""
+
+    heard: Callable[[Message], bool]
+    key: str
 
 
 class Publisher:
@@ -27,10 +36,11 @@ class Publisher:
         *,
         lossless: bool = False,
         patient_puts: PatientPuts | None = None,
+        aside: Aside | None = None,
     ) -> None:
         """`lossless` waits where a link is full instead of dropping: for lockstep, where a lost frame makes runs differ.
 
-        That may take seconds; with `patient_puts` the loop is not held so long.
+        That may take seconds; with `patient_puts` the loop is not held so long. `aside`: not all is to be heard.
         """
         profile = PROFILES[topic.delivery]
         self.key = key
@@ -40,12 +50,17 @@ class Publisher:
         self._report = report
         self._patient_puts = patient_puts
         self._rate = Rate(time.monotonic())
-        self._publisher = session.declare_publisher(
-            key,
-            encoding=codec.encoding_of(topic.type),
-            congestion_control=zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP,
-            priority=profile.priority,
-            express=profile.express,
+        self._aside = aside
+        keys = (key,) if aside is None else (key, aside.key)
+        self._publisher, *self._aside_publishers = (
+            session.declare_publisher(
+                said_on,
+                encoding=codec.encoding_of(topic.type),
+                congestion_control=zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP,
+                priority=profile.priority,
+                express=profile.express,
+            )
+            for said_on in keys
         )
 
     def put(self, message: Message) -> None:
@@ -55,16 +70,18 @@ class Publisher:
         """
         if type(message) is not self._topic.type:
             raise TypeError(f"{self.key} carries {self._topic.type.__name__}, not {type(message).__name__}")
+        heard = self._aside is None or self._aside.heard(message)
         payload = codec.encode(message)
         if len(payload) > self._topic.max_bytes:
             self.oversized += 1
             self._report(f"size {self.key}", f"{self.key}: not published: {oversize(len(payload), self._topic)}")
             return
+        publisher = self._publisher if heard else self._aside_publishers[0]
         if self._patient_puts is None:
-            self._publisher.put(payload)
-        elif not self._patient_puts.do(lambda: self._publisher.put(payload)):
+            publisher.put(payload)
+        elif not self._patient_puts.do(lambda: publisher.put(payload)):
             return
-        self.published += 1
+        self.published += heard
 
     def matching(self) -> bool:
         """Whether somebody subscribes to the key."""

@@ -22,6 +22,8 @@ from .site import Site, SiteError, load_site
 
 STARTED_BEFORE = "DEIXIS_STARTED_BEFORE"
 """Environment variable by which the supervisor tells a child how often it was started before."""
+STAND_BY = "DEIXIS_STAND_BY"
+"""Environment variable that has a stage stand by at its start, as --stand-by does: for stages in any language."""
 
 
 class ConfigError(ValueError):
@@ -41,7 +43,8 @@ C = TypeVar("C", bound=StageConfig)
 class CommonOptions:
     """What every stage is told on its command line.
 
-    started_before: how often its supervisor has started it before: 0 for the first process.
+    started_before: how often its supervisor has started it before: 0 for the first process. stand_by: it is a newcomer, not
+    heard until it has taken the place of the process that is (`deixis swap`).
     """
 
     robot: str
@@ -52,6 +55,7 @@ class CommonOptions:
     started_before: int
     site: Site | None
     sets: tuple[str, ...]
+    stand_by: bool = False
 
 
 def parse_options(stage: str, description: str, argv: list[str] | None) -> CommonOptions:
@@ -64,8 +68,13 @@ def parse_options(stage: str, description: str, argv: list[str] | None) -> Commo
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="sets", help="override one setting")
     parser.add_argument("--instance", type=checked_name, help="name of this process (default: host and process number)")
     parser.add_argument("--lockstep", action="store_true", help="time is that of the frames; for reproducible runs")
+    if stage in topics.SWAPPABLE:
+        parser.add_argument(
+            "--stand-by", action="store_true", help="work unheard until 'deixis swap' gives it the place of another"
+        )
     parser.add_argument("--supervised", action="store_true", help="stop when the parent process is gone")
     given = parser.parse_args(argv)
+    stand_by = stage in topics.SWAPPABLE and (given.stand_by or os.environ.get(STAND_BY, "") not in ("", "0"))
     before = started_before(os.environ.get(STARTED_BEFORE, "0"))
     try:
         site = load_site(given.site) if given.site else None
@@ -73,13 +82,14 @@ def parse_options(stage: str, description: str, argv: list[str] | None) -> Commo
         raise ConfigError(str(error)) from None
     return CommonOptions(
         robot=given.robot,
-        instance=given.instance or (lockstep_instance(before) if given.lockstep else default_instance()),
+        instance=given.instance or (lockstep_instance(before) if given.lockstep and not stand_by else default_instance()),
         connect=given.connect,
         lockstep=given.lockstep,
         supervised=given.supervised,
         started_before=before,
         site=site,
         sets=tuple(given.sets),
+        stand_by=stand_by,
     )
 
 
@@ -122,10 +132,10 @@ def lockstep_instance(started_before: int) -> str:
     return f"lockstep-{started_before}" if started_before else "lockstep"
 
 
-def default_instance() -> str:
-    """Name of this process: host and process number."""
+def default_instance(pid: int | None = None) -> str:
+    """Name of this process, or of that one of this host: host and process number."""
     host = re.sub(r"[^A-Za-z0-9_.\-]", "-", socket.gethostname()).lstrip(".-")[:40] or "host"
-    return f"{host}-{os.getpid()}"
+    return f"{host}-{os.getpid() if pid is None else pid}"
 
 
 def _value(item: str, text: str) -> Any:

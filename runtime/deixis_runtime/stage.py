@@ -20,6 +20,7 @@ from deixis_schemas.topics import Topic
 from .certificates import certificates_of
 from .clock_watch import ClockWatch
 from .delivery import PROFILES
+from .handover import Handover
 from .heartbeat import Heartbeat
 from .inputs import Subscription
 from .limit import RateLimit
@@ -40,9 +41,11 @@ C = TypeVar("C", bound=StageConfig)
 
 EXIT_CONFIG = 78
 EXIT_UNREACHABLE = 69
+EXIT_REPLACED = 79  # told to its supervisor, who is not to start it again while another has its place
 IDLE_WAIT_S = 0.25
 # A signal handler may set a plain attribute only (`threading.Event.set` can deadlock in one): `wait` looks this often.
 STOP_POLL_S = 0.1
+TOKENS_WITHIN_S = 1.0
 ANSWERING_S = 0.01
 # Who looks on through a new router hears of us when it has its subscriptions, too, and not a whole period later.
 LINK_SETTLES_S = 0.25
@@ -61,6 +64,7 @@ class Node:
         self.started_before = options.started_before
         self.log = logging.getLogger(f"deixis-{stage}")
         self.stopping = False
+        self.replaced = False
         self._session = session
         self._endpoint = options.connect
         self._parent = Parent(os.environ) if options.supervised else None
@@ -82,6 +86,11 @@ class Node:
         self._declared: list[Any] = []  # Zenoh undeclares what is not referenced
         self._alive = AliveStages(session, self.robot, self.wake)
         self._is_stage = is_stage
+        self._supervised = options.supervised
+        self._handover: Handover | None = None
+        if is_stage and stage in topics.SWAPPABLE:
+            self._handover = Handover(session, self.robot, self.producer, self._alive, self.wake, standing_by=options.stand_by)
+            self.serve_get(topics.VOICE, self._answer_voice, stage=stage, id=options.instance)
         self._doubles: set[str] = set()
         self._token: Any = None
         self._health = self.publish(topics.HEALTH)
@@ -110,7 +119,11 @@ class Node:
     def publish(self, topic: Topic) -> Publisher:
         """A publisher of a topic of this stage."""
         key = topic.key(self.robot, stage=self.producer.stage)
-        publisher = Publisher(self._session, topic, key, self.warn, lossless=self.lockstep, patient_puts=self._patient_puts)
+        by_frame = self._handover is not None and topic.by is topics.By.FRAME
+        aside = self._handover.aside(topic, self.monotonic_s) if self._handover is not None and by_frame else None
+        publisher = Publisher(
+            self._session, topic, key, self.warn, lossless=self.lockstep, patient_puts=self._patient_puts, aside=aside
+        )
         self._outputs.append(publisher)
         return publisher
 
@@ -154,6 +167,10 @@ class Node:
         """Find out, again and again, whether those who listen to a topic are on this host; call its `turn` in the loop."""
         return Readers(self._session, self.robot, topic, self.producer, self._alive, self._router)
 
+    def alive_processes(self) -> set[tuple[str, str]]:
+        """(stage, instance) of those whose token stands."""
+        return self._alive.processes()
+
     def alive_stages(self) -> set[str]:
         """Stages with a process whose liveliness token stands. A hung process keeps its token; health tells."""
         return self._alive.stages()
@@ -171,6 +188,7 @@ class Node:
         answer_until_s = time.monotonic() + ANSWERING_S
         if any([queue.answer_until(answer_until_s) for queue in self._queries]):  # noqa: C419 - each has its turn
             self.wake()
+        self._turn_handover()
         if self._heartbeat.due_in_s() == 0.0:
             self._beat()
         return self._go_on()
@@ -281,7 +299,10 @@ class Node:
 
     def _record(self) -> Health:
         clocks = [known for watch in self._clocks if (known := watch.health()) is not None]
-        return self._heartbeat.record(self.now_ns(), self._inputs, self._outputs, clocks, self._router())
+        standing_by = self._handover is not None and not self._handover.heard
+        return self._heartbeat.record(
+            self.now_ns(), self._inputs, self._outputs, clocks, self._router(), standing_by=standing_by
+        )
 
     def _router(self) -> str:
         """Zenoh id of the router we are a client of; empty without one."""
@@ -290,9 +311,42 @@ class Node:
     def _declare_alive(self) -> None:
         settle()
         # Only now, when all subscribers stand: whoever waits for the token may publish at once.
-        self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
+        if self._handover is None:
+            self._token = self._session.liveliness().declare_token(topics.alive_key(self.robot, *self.producer))
+        else:
+            self._token = self._handover
+            if self.started_before and self._supervised and self._is_replaced():
+                return
+            self._handover.declare()
         if self._is_stage:
-            self.log.info("ready as %s on robot %s", self.producer.instance, self.robot)
+            waits = "" if self._handover is None or self._handover.heard else ", standing by"
+            self.log.info("ready as %s on robot %s%s", self.producer.instance, self.robot, waits)
+
+    def _is_replaced(self) -> bool:
+        """Whether another has got the place of the process that was here before: then this one is not needed."""
+        mine = topics.alive_key(self.robot, self.producer.stage, "*")
+        others = [str(reply.ok.key_expr) for reply in self._session.liveliness().get(mine, timeout=TOKENS_WITHIN_S) if reply.ok]
+        if others:
+            self.log.info("%s has the place of the process that was here before", others[0].split("/")[-1])
+            self.replaced = True
+            self.stop()
+        return self.replaced
+
+    def _turn_handover(self) -> None:
+        if self._handover is None:
+            return
+        said = self._handover.turn(self.monotonic_s(), self._router())
+        if said:
+            self.log.warning("%s", said)
+            self._heartbeat.hasten(0.0)
+        if self._handover.leaving and not self.replaced:
+            self.log.info("%s has taken the place; leaving", self._handover.part.other)
+            self.replaced = True
+            self.stop()
+
+    def _answer_voice(self, query: Query) -> list[tuple[str, Message]]:
+        assert self._handover is not None
+        return self._handover.answer(query, self.monotonic_s(), self.now_ns())
 
     def _frames_clock(self) -> ClockWatch | None:
         if self._clock_of_frames is None and not self.lockstep:
@@ -301,6 +355,10 @@ class Node:
 
     def _look_at_doubles(self) -> None:
         # At the second look only: the token of a predecessor that was killed may stand for a moment.
+        if self._handover is not None and not self._handover.heard:
+            self._doubles = set()
+            self.note("doubles", None)
+            return
         alive = {instance for stage, instance in self._alive.processes() if stage == self.producer.stage}
         doubles, before = alive - {self.producer.instance}, self._doubles
         self._doubles = doubles
@@ -362,7 +420,7 @@ def run_stage(
         # On a starved machine Zenoh's watchdog takes a shared buffer back before all have read it: a frame lost in seven
         # hundred or so. Live, the next one makes up for it; in lockstep two runs would differ.
         with open_client(options.connect, shared_memory=not options.lockstep) as session:
-            _serve(session, stage, options, config, serve)
+            replaced = _serve(session, stage, options, config, serve)
     except ConfigError as error:
         log.error("%s", error)
         exit_now(EXIT_CONFIG)
@@ -373,7 +431,8 @@ def run_stage(
         log.exception("stopped by a fault")
         exit_now(1)
     log.info("stopped")
-    exit_now(0)
+    # To systemd it is an end in good order, after which nothing is started again; a supervisor starts again whatever ends.
+    exit_now(EXIT_REPLACED if replaced and options.supervised else 0)
     return 0
 
 
@@ -388,7 +447,8 @@ def setup_logging() -> None:
     )
 
 
-def _serve(session: zenoh.Session, stage: str, options: CommonOptions, config: C, serve: Callable[[Node, C], None]) -> None:
+def _serve(session: zenoh.Session, stage: str, options: CommonOptions, config: C, serve: Callable[[Node, C], None]) -> bool:
+    """Whether the stage has ended because another process has its place."""
     try:
         node = Node(session, stage, options)
     except zenoh.ZError as error:
@@ -396,3 +456,4 @@ def _serve(session: zenoh.Session, stage: str, options: CommonOptions, config: C
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: node.stop())
     serve(node, config)
+    return node.replaced

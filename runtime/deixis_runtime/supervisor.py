@@ -7,13 +7,13 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from .launching import Child, start_process
 from .restarts import Restarts
 from .settings import STARTED_BEFORE
-from .stage import EXIT_CONFIG, EXIT_UNREACHABLE
+from .stage import EXIT_CONFIG, EXIT_REPLACED, EXIT_UNREACHABLE
 
 log = logging.getLogger("deixis-supervisor")
 
@@ -23,12 +23,17 @@ SETTLED_S = 15.0  # longer than a start may take: who hangs in it is ended by th
 SIGNALS = {number.value: number.name for number in signal.Signals}
 
 
+Launch = Callable[[Sequence[str], Mapping[str, str]], Child]
+
+
 @dataclass
 class Process:
     """One child: its command and how it has fared.
 
     needs: the one without which it cannot start. started: how often, of which all but the first were restarts. last_end: why it
-    ended last, in words, and ended_s when; killed_for: why we have killed it. given_up: why it is not started again.
+    ended last, in words, and ended_s when; killed_for: why we have killed it. given_up: why it is not started again; once: it
+    is not, however it ends; replaced: another process has its place, and it is started again when that is gone (`start_again`).
+    launch: how it is started, if not as all others.
     """
 
     name: str
@@ -43,6 +48,9 @@ class Process:
     last_end: str = ""
     ended_s: float = 0.0
     given_up: str = ""
+    once: bool = False
+    replaced: bool = False
+    launch: Launch | None = None
 
     @property
     def running(self) -> bool:
@@ -56,23 +64,46 @@ class Supervisor:
     def __init__(self) -> None:
         self.processes: dict[str, Process] = {}
         self.environment: Mapping[str, str] = os.environ
-        self.launch = start_process
+        self.launch: Launch = start_process
 
-    def start(self, name: str, argv: list[str], needs: str | None = None) -> None:
+    def start(
+        self, name: str, argv: list[str], needs: str | None = None, *, once: bool = False, launch: Launch | None = None
+    ) -> None:
         """Start a child. It gets its own session, so that Ctrl-C reaches the supervisor alone, which stops them in order."""
-        process = self.processes[name] = Process(name, argv, needs)
+        process = self.processes[name] = Process(name, argv, needs, once=once, launch=launch)
         self._spawn(process)
 
     def poll(self) -> None:
         """Notice children that ended and start them again, after a pause and with a limit: see `restarts`."""
         now_s = time.monotonic()
         for process in self.processes.values():
-            if process.given_up or process.running:
+            if process.given_up or process.running or process.replaced or (process.once and process.last_end):
                 continue
             if process.start_again_s is None:
                 self._plan_restart(process, now_s)
             if process.start_again_s is not None and now_s >= process.start_again_s:
                 self._spawn(process)
+
+    def start_again(self, name: str) -> None:
+        """Start a child again whose place another had."""
+        process = self.processes[name]
+        process.replaced = False
+        self._spawn(process)
+
+    def adopt(self, newcomer: str, name: str, argv: list[str]) -> None:
+        """Let a child that was started once take the name of the one whose place it has; this command starts it again."""
+        process = self.processes.pop(newcomer)
+        process.name, process.argv, process.once = name, argv, False
+        process.needs = self.processes[name].needs
+        self.processes[name] = process
+
+    def drop(self, name: str) -> None:
+        """Forget a child that was started once, ending it where it still runs."""
+        process = self.processes.pop(name)
+        if process.popen is not None and process.running:
+            process.popen.send_signal(signal.SIGTERM)
+            process.popen.send_signal(signal.SIGCONT)
+            self._await_end(process, time.monotonic() + STOP_TIMEOUT_S)
 
     def running(self) -> dict[str, int]:
         """Process numbers by name of the children that run now."""
@@ -128,7 +159,7 @@ class Supervisor:
         process.started += 1
         process.started_s = time.monotonic()
         try:
-            process.popen = self.launch(process.argv, environment)
+            process.popen = (process.launch or self.launch)(process.argv, environment)
         except OSError as error:
             process.given_up = f"it cannot be started: {error.strerror}"
             log.error("%s is given up: %s", process.name, process.given_up)
@@ -139,6 +170,13 @@ class Supervisor:
         assert status is not None
         process.last_end, process.ended_s = process.killed_for or say_status(status), now_s
         process.killed_for = ""
+        if status == EXIT_REPLACED and not process.once:
+            process.replaced = True
+            log.warning("%s was replaced by another process; it is started again when that is gone", process.name)
+            return
+        if process.once:
+            log.warning("%s ended (%s)", process.name, process.last_end)
+            return
         if status == EXIT_CONFIG:
             process.given_up = "its settings are wrong"
         else:
@@ -164,4 +202,6 @@ def say_status(status: int) -> str:
         return f"killed by {SIGNALS.get(-status, f'signal {-status}')}"
     if status == EXIT_UNREACHABLE:
         return "no router, or its endpoint is taken"
+    if status == EXIT_REPLACED:
+        return "replaced by another process"
     return f"status {status}"

@@ -30,5 +30,8 @@ def account_of(processes: Collection[Process], now_s: float) -> Account:
 
 def _note(process: Process, now_s: float) -> str:
     restarts = process.started - 1
+    if process.replaced:
+        since_s = now_s - process.ended_s
+        return f"{process.name}: another process has its place since {since_s:.0f} s; it is started again when that is gone"
     often = f"started again {restarts} time{'s' if restarts > 1 else ''}" if restarts else "waits to be started again"
     return f"{process.name}: {often}; the last end, {now_s - process.ended_s:.0f} s ago: {process.last_end}"

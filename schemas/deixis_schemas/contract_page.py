@@ -7,7 +7,7 @@ from typing import Any
 
 from .messages import TYPES, Message
 from .schema_words import default_of, link, what
-from .topics import INPUTS, STAGES, TOPICS, Topic, alive_key
+from .topics import INPUTS, STAGES, SWAPPABLE, TOPICS, Topic, alive_key, standby_alive_key, standby_key
 
 INTRODUCTION = """# The contract
 
@@ -37,12 +37,42 @@ stage](swap.md)).
 * A stage holds the liveliness token `{alive}` while it works.
 * It works on the newest input that it has and never on a backlog, answers each frame that it works on once, also with an
   empty list, and drops what is older than the table allows (not where `camera/info` says `lockstep`).
+
+## Changing places
+
+Two processes of one stage (of {swappable}) can change places between two frames, ordered by `deixis swap`.
+No stage need take part; one that does owes this ([swap.md](swap.md#replace-a-stage-while-it-runs) names an example):
+
+* Started with `DEIXIS_STAND_BY=1` in its environment it stands by: it works on all that comes, holds the token
+  `{standby_alive}` in place of the other, and puts its answers on
+  `{standby}`, with the label and fields they would have. Its health, if it gives one, says
+  `standing_by`.
+* It answers gets on `deixis/{robot}/{stage}/voice/{instance}` with a `Voice`, or with an error that says why not:
+  without a parameter, how it stands; and `?op=` one of these:
+* `take;from=OLD`, to one that stands by: it gets `?op=yield;to=ITSELF` from OLD. Where the answer comes within 1.5 s, the
+  frame that it names and all behind it are the newcomer's (all frames, where it names none); it exchanges its token at
+  once, and puts answers to those frames on the topic. Where none comes in time it stands by as before.
+* `yield;to=NEW`, to the one that is heard: it names a frame some 15 ahead of the last that it has answered (the next one,
+  where none come), once; asked again by NEW it names the same, and another than NEW is refused. It exchanges its token at
+  once, answers the frames before that one on the topic, and those behind it aside. Frames of the runs that begin later
+  are behind it.
+* `leave`, to one that has yielded: it ends, with status 0.
+* One that has yielded should watch the token of NEW: where it does not come within 2.5 s, or goes while the link to the
+  router stands, it is heard again, from the first frame on that neither has answered.
 """
 
 
 def contract_page() -> str:
     """The page in Markdown."""
-    text = INTRODUCTION.replace("{alive}", alive_key("{robot}", "{stage}", "{instance}"))
+    filled = {
+        "{alive}": alive_key("{robot}", "{stage}", "{instance}"),
+        "{standby_alive}": standby_alive_key("{robot}", "{stage}", "{instance}"),
+        "{standby}": standby_key(TOPICS[0], "{robot}").replace(TOPICS[0].path, "{stage}/{topic}"),
+        "{swappable}": ", ".join(SWAPPABLE),
+    }
+    text = INTRODUCTION
+    for name, value in filled.items():
+        text = text.replace(name, value)
     return "\n".join([text, *_topics(), *_stages(), *_types()]).rstrip() + "\n"
 
 

@@ -61,6 +61,7 @@ FrameEncoding = Literal["bgr8", "mono8", "jpeg"]
 CameraState = Literal["starting", "streaming", "retrying", "ended", "failed"]
 SourceStatus = Literal["ok", "late", "dead", "wrong_version", "not_tracking"]
 HealthState = Literal["ok", "degraded", "failed"]
+VoiceState = Literal["speaks", "yields", "stands_by", "asks"]
 
 
 class Producer(NamedTuple):
@@ -617,8 +618,26 @@ class Health(Produced):
     clocks: list[ClockHealth] = Field(
         default_factory=list, max_length=8, description="Clocks that the stage compares with its own, for their stamps."
     )
+    standing_by: bool = Field(
+        default=False,
+        description="It works and is not heard: it waits to take the place of another process, or has yielded its own.",
+    )
+
+
+class Voice(Produced):
+    """Which of two processes of a stage is heard: the answer to a get of `{stage}/voice/{instance}`."""
+
+    state: VoiceState = Field(
+        description="`speaks`: it answers frames, from `run`, `seq` on where they are there. `yields`: up to that frame, and "
+        "then `other` does. `stands_by`: it works and is not heard. `asks`: it has asked `other` to yield."
+    )
+    other: Text = Field(default="", description="Instance with which it changes places or has changed them.")
+    run: Count | None = Field(default=None, description="Of the first frame that is the newcomer's; none where all are.")
+    seq: Count | None = None
+    reason: Text = Field(default="", description="Of one that stands by: why it did not get the place that it asked for last.")
 
 
 TYPES: dict[str, type[Message]] = {
-    cls.__name__: cls for cls in (Frame, CameraInfo, Tracks, HeadPoses, Gestures, Belief, Target, State, Poi, RobotPose, Health)
+    cls.__name__: cls
+    for cls in (Frame, CameraInfo, Tracks, HeadPoses, Gestures, Belief, Target, State, Poi, RobotPose, Health, Voice)
 }

@@ -202,4 +202,5 @@ SAMPLES: tuple[m.Message, ...] = (
         versions={"deixis-schemas": "0.1.0", "deixis-tracker": "0.1.0", "eclipse-zenoh": "1.10.2"},
         clocks=[m.ClockHealth(stage="camera", host="robot", ahead_s=-0.012, uncertain_s=0.001)],
     ),
+    m.Voice(stamp_ns=STAMP_NS, stage="headpose", instance="edge-2", state="yields", other="edge-9", run=3, seq=22),
 )

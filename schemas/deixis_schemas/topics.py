@@ -4,6 +4,7 @@ conformance) is derived from it.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import Enum
 
@@ -167,8 +168,19 @@ HEALTH = Topic(
     silence="For 3 s: the process is hung or gone; its liveliness token tells which.",
 )
 
+VOICE = Topic(
+    "{stage}/voice/{id}",
+    m.Voice,
+    By.GET,
+    None,
+    Delivery.REPLY,
+    queryable=True,
+    max_bytes=64 << 10,
+    silence="No reply: that process is gone or knows nothing of changing places, or access control denies the get.",
+)
+
 TOPICS: tuple[Topic, ...] = (
-    FRAME, CAMERA_INFO, TRACKS, HEAD_POSES, GESTURES, BELIEF, TARGET, STATE, POI, ROBOT_POSE, HEALTH,
+    FRAME, CAMERA_INFO, TRACKS, HEAD_POSES, GESTURES, BELIEF, TARGET, STATE, POI, ROBOT_POSE, HEALTH, VOICE,
 )  # fmt: skip
 
 # The stages that every frame passes, in their order: a row of the table makes one.
@@ -183,6 +195,10 @@ INPUTS: dict[str, tuple[Topic, ...]] = {
 }
 """What each stage works on; those about frames in the order in which they come."""
 
+SWAPPABLE = tuple(topic.stage for topic in (TRACKS, HEAD_POSES, GESTURES))
+"""Stages of which two processes can change places between two frames: their answers are named by the camera's `run` and `seq`,
+and they keep nothing that lasts. A camera has a device and a `run` of its own, fusion the registry and open episodes."""
+
 SUPERVISOR = "supervisor"
 """The name, in place of a stage's, of the process that starts a host's stages: its health says how they fare."""
 
@@ -190,6 +206,22 @@ SUPERVISOR = "supervisor"
 def alive_key(robot: str, stage: str, instance: str) -> str:
     """Liveliness token of one process of a stage."""
     return f"deixis/{robot}/@alive/{stage}/{instance}"
+
+
+def standby_alive_key(robot: str, stage: str, instance: str) -> str:
+    """Liveliness token of a process that stands by: it works, and is not heard yet or no more."""
+    return f"{alive_key(robot, stage, instance)}/standby"
+
+
+def standby_key(topic: Topic, robot: str) -> str:
+    """Where a process that stands by says what it would answer on the topic; no wildcard of a listener takes it in."""
+    stage, name = topic.path.split("/")
+    return f"deixis/{robot}/@standby/{stage}/{name}"
+
+
+def is_name(text: str) -> bool:
+    """Whether it can be one part of a key: a robot, an instance, a POI's id."""
+    return re.fullmatch(m.NAME_PATTERN, text) is not None
 
 
 def topic_of(key: str) -> Topic | None:

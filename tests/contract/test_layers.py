@@ -1,6 +1,6 @@
-"""Arrows point down: cli, conformance, evaluation, simulation -> services -> runtime -> schemas; no service imports another.
+"""Arrows point down: calibration, cli, conformance, view, evaluation, simulation -> services -> runtime -> schemas.
 
-A bridge stands where a service does.
+No service imports another. A bridge stands where a service does.
 """
 
 import ast
@@ -16,8 +16,15 @@ MAY_IMPORT = {
     **{f"deixis_{name}": {"deixis_schemas", "deixis_runtime"} for name in SERVICES},
     "deixis_cli": {"deixis_schemas", "deixis_runtime"},
     "deixis_ros2": {"deixis_schemas", "deixis_runtime"},
+    "deixis_view": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
+    "deixis_calibration": {
+        *("deixis_schemas", "deixis_runtime", "deixis_cli"),
+        # It reads pictures as the camera does, writes what the camera reads, shows what the tracker sees, and asks fusion.
+        *("deixis_camera", "deixis_tracker", "deixis_fusion"),
+    },
     "deixis_conformance": {"deixis_schemas", "deixis_runtime", "deixis_cli"},
     "deixis_evaluation": {"deixis_schemas", "deixis_runtime", "deixis_cli", *(f"deixis_{name}" for name in SERVICES)},
+    **{f"deixis_{name}_mediapipe": {"deixis_schemas", "deixis_runtime"} for name in ("tracker", "headpose", "gesture")},
     "deixis_simulation": {
         *("deixis_schemas", "deixis_runtime", "deixis_cli"),
         # A rehearsal plays a site's clips and scores the answers, and says what the stages' settings allow.

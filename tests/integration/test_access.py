@@ -4,14 +4,18 @@ The test publishes and subscribes as stages and people would. What is denied is 
 behind it, and when that has come the rest would have.
 """
 
+import signal
 import sys
 from contextlib import ExitStack
 
 import pytest
 import zenoh
 from deixis_runtime.session import client_config
+from deixis_schemas import codec
+from deixis_schemas.samples import SAMPLES
 from parties import Party, until_heard
-from running import answers, free_port, process, wait_until
+from rerun_ready import columns, needs_rerun
+from running import answers, command, free_port, process, wait_until
 from site_made import YEAR, add, holder, make_site
 
 PATIENCE_S = 30.0
@@ -124,6 +128,29 @@ def test_who_hears_what(site, stages, who, readable):
         reader.listen(key(path))
     reader.listen("deixis/r2/fusion/target")
     assert heard_of(reader, stages, "deixis/r2/fusion/target" if who != "robot:r1" else TARGET) == readable
+
+
+@needs_rerun
+def test_a_viewer_is_shown_all_but_the_picture_and_told_so(site, stages, tmp_path):
+    out, log = tmp_path / "out.rrd", tmp_path / "log"
+    argv = command(
+        "deixis", "view", "--robot", ROBOT, "--connect", site.edge, "--certs", site.certs["viewer:anna"].folder, "--out", out
+    )
+    samples = {type(message).__name__: message for message in SAMPLES}
+    with process(argv, log) as child:
+
+        def told():
+            for path, name in (("camera/frame", "Frame"), ("tracker/tracks", "Tracks"), ("fusion/belief", "Belief")):
+                sample = samples[name]
+                stages.session.put(key(path), codec.encode(sample), encoding=codec.encoding_of(type(sample)))
+            return "all is shown but pictures" in log.read_text()
+
+        wait_until(told, "it says that there are no pictures", PATIENCE_S, log)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(PATIENCE_S) == 0
+    found = columns(out)
+    assert "/picture/tracks" in found
+    assert "/picture" not in found
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import POINTED_AT, ROOT, command, process, system
+from running import POINTED_AT, ROOT, command, process, system, wait_until
 
 CRATE = ROOT / "guests" / "gesture_rust"
 # The build takes a minute or two, and each clean checkout would begin anew.
@@ -50,7 +50,7 @@ def test_it_keeps_the_contract(guest):
 def test_its_own_tests_pass():
     tested = cargo("test", timeout=540)
     assert tested.returncode == 0, tested.stdout[-3000:] + tested.stderr[-3000:]
-    assert "4 passed" in tested.stdout
+    assert "6 passed" in tested.stdout
 
 
 def test_an_answer_rests_on_its_evidence(tmp_path, robot, guest):
@@ -68,3 +68,28 @@ def test_an_answer_rests_on_its_evidence(tmp_path, robot, guest):
 
         target = running.wait_until(answered, "an answer that rests on the guest's gesture", 120)
         assert POINTED_AT in target["poi_ids"], target["reason"]
+
+
+def test_it_takes_the_place_of_a_running_stage_between_two_frames(tmp_path, robot, guest):
+    with system(tmp_path, robot) as running:
+        running.wait_until(lambda: running.state().get("last_seq", -1) > 0, "frames to be answered", 60)
+        # Of two in one place: first the guest takes ours, then one of ours the guest's; it yields as it takes.
+        argv = ["--robot", robot, "--connect", running.endpoint, "--watch", "0.3", "--json"]
+        start = f"{guest} --robot {{robot}} --connect {{connect}}"
+        log = tmp_path / "swap"
+        with process(command("deixis", "swap", "gesture", "--command", start, *argv), log) as child:
+            wait_until(lambda: "runs here until Ctrl-C" in log.read_text() or child.poll() is not None, "the swap", 90, log)
+            first = next(json.loads(line) for line in log.read_text().splitlines() if line.startswith("{"))
+            assert first["new"].startswith("rust-")
+            ours = command(
+                "deixis-gesture", "--robot", robot, "--connect", running.endpoint, "--instance", "ours", "--stand-by"
+            )
+            with process([*ours, "--lockstep"], tmp_path / "ours"):
+                back = subprocess.run(
+                    command("deixis", "swap", "gesture", "--instance", "ours", *argv),
+                    capture_output=True, text=True, timeout=90, check=False,
+                )  # fmt: skip
+                assert back.returncode == 0, back.stderr
+                second = json.loads(back.stdout)
+                assert (second["old"], second["new"]) == (first["new"], "ours")
+        assert [cost[name] for cost in (first, second) for name in ("gap_frames", "twice", "unanswered")] == [0] * 6

@@ -9,7 +9,8 @@ import urllib.request
 import pytest
 from deixis_cli.main import main
 from fusion_bench import fusion_bench, router
-from headless_browser import browser
+from headless_browser import needs_chromium
+from headless_browser import page as browser_page
 from running import SITE, command, process, tail, wait_until
 
 
@@ -38,7 +39,9 @@ def address(bench, tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(address, tmp_path_factory):
     """The page, opened and shown with the points."""
-    with browser(tmp_path_factory.mktemp("browser") / "profile") as it:
+    # It draws on a plain canvas, and needs no emulated GPU.
+    with browser_page(tmp_path_factory.mktemp("browser"), (1280, 800), "--disable-gpu") as it:
+        it.note_errors()
         it.open(address)
         it.wait_for("document.querySelector('#status')?.textContent === 'live'")
         it.wait_for("document.querySelectorAll('#pois li').length === 10")
@@ -77,6 +80,7 @@ def pixel_of(page, x, y):
     return left + 200 + 200 * (x - x0) / (x1 - x0), top + 200 + 200 * (y - y0) / (y1 - y0)
 
 
+@needs_chromium
 def test_a_click_adds_a_poi_a_drag_moves_it_and_both_are_in_the_registry(page, bench):
     assert "the ship model" in page.text()
     page.click(*pixel_of(page, 2.0, 0.0))
@@ -100,6 +104,7 @@ def test_a_click_adds_a_poi_a_drag_moves_it_and_both_are_in_the_registry(page, b
     assert page.errors == []
 
 
+@needs_chromium
 def test_an_edit_is_undone_a_delete_asks_first_and_edits_of_others_appear(page, bench):
     before = stored(bench)["P3"]
     page.drag(place_of(page, "P3"), pixel_of(page, 0.0, -1.9))
@@ -119,6 +124,7 @@ def test_an_edit_is_undone_a_delete_asks_first_and_edits_of_others_appear(page, 
     assert page.errors == []
 
 
+@needs_chromium
 def test_what_is_typed_outlives_fusion_and_the_page_says_that_it_is_gone(page, bench):
     page.press("#pois button[title='P1']")
     page.type_into("[name=name]", "the green vase")

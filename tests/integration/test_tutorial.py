@@ -16,7 +16,8 @@ def as_script(edge_port, robot_port, alone_port):
     """The tutorial's commands as one script, on ports that are free."""
     blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
     assert blocks[0] == "make demo\n"
-    text = "\n".join(["set -euo pipefail", *blocks[1:]])
+    # What a failed command leaves running is ended with the script.
+    text = "\n".join(["set -euo pipefail", "trap 'kill $(jobs -p) 2>/dev/null || true' EXIT", *blocks[1:]])
     # A busy machine is slow, which the doctor finds wrong.
     for said, done in (
         (ROBOT_UP, f"{ROBOT_UP} --listen tcp/127.0.0.1:{robot_port}"),

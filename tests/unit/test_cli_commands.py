@@ -9,7 +9,7 @@ import deixis_runtime
 import pytest
 from deixis_cli import main as command_line
 
-COMMANDS = {"run", "up", "status", "watch", "certs", "doctor", "poi", "record", "replay"}
+COMMANDS = {"run", "up", "status", "watch", "certs", "doctor", "poi", "record", "replay", "swap"}
 
 
 def entry(name, register):

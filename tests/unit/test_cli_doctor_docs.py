@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "doctor.md").read_text()
-PACKAGES = ("cli/deixis_cli", "runtime/deixis_runtime", "services/camera/deixis_camera")
+PACKAGES = ("cli/deixis_cli", "runtime/deixis_runtime", "services/camera/deixis_camera", "calibration/deixis_calibration")
 # What doctor says comes from these; the other sources of a finding's text stand in the findings themselves.
 PARTS_FROM = ("runtime/deixis_runtime/clock_watch.py", "runtime/deixis_runtime/endpoint.py", "cli/deixis_cli/system.py")
 BLANK = "…"

@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+import zenoh
 from deixis_runtime.access import AccessList
 from deixis_runtime.access_control import access_control, frames_stay_here
 from deixis_runtime.certificates import Certificates
@@ -137,6 +138,17 @@ def test_names_are_written_out_for_zenoh_knows_no_patterns_of_them():
     )
     assert {policy["id"] for policy in rules["policies"]} == {"local", "robot:r1", "robot:r2", "edge", "viewer", "editor"}
     assert {rule["permission"] for rule in rules["rules"]} == {"allow"}
+
+
+@pytest.mark.parametrize("who", ["viewer", "editor", "robot:r1"])
+def test_a_swap_is_ordered_by_nobody_who_comes_by_a_link_but_the_edge(who):
+    rules = access_control(AccessList(members=MEMBERS))
+    voices = zenoh.KeyExpr("deixis/r1/headpose/voice/one")
+    asked = [zenoh.KeyExpr(key) for key in allowed(rules, who, "ingress", "query")]
+    assert asked
+    assert not [key for key in asked if key.intersects(voices)]
+    assert [key for key in allowed(rules, "edge", "ingress", "query") if zenoh.KeyExpr(key).includes(voices)]
+    assert [key for key in allowed(rules, "local", "ingress", "query") if zenoh.KeyExpr(key).includes(voices)]
 
 
 def test_a_role_that_nobody_has_gets_no_rules():

@@ -7,6 +7,7 @@ pub const TRACKS: &str = "application/msgpack;Tracks/2";
 pub const CAMERA_INFO: &str = "application/msgpack;CameraInfo/1";
 pub const GESTURES: &str = "application/msgpack;Gestures/2";
 pub const HEALTH: &str = "application/msgpack;Health/1";
+pub const VOICE: &str = "application/msgpack;Voice/1";
 pub const MAX_AGE_S: f64 = 1.0;
 pub const MAX_BYTES: usize = 1 << 20;
 
@@ -82,6 +83,25 @@ impl Gesture {
     }
 }
 
+/// What is said to a get of `gesture/voice/{instance}`.
+#[derive(Serialize)]
+pub struct Voice<'a> {
+    pub stamp_ns: u64,
+    pub stage: &'a str,
+    pub instance: &'a str,
+    pub state: &'static str,
+    pub other: &'a str,
+    pub run: Option<u64>,
+    pub seq: Option<u64>,
+}
+
+/// What is read of the answer of the one that is heard.
+#[derive(Deserialize)]
+pub struct Named {
+    pub run: Option<u64>,
+    pub seq: Option<u64>,
+}
+
 #[derive(Serialize)]
 pub struct Health<'a> {
     pub stamp_ns: u64,
@@ -96,6 +116,7 @@ pub struct Health<'a> {
     pub rss_mb: f64,
     pub inputs: [InputHealth; 1],
     pub outputs: [OutputHealth; 1],
+    pub standing_by: bool,
 }
 
 #[derive(Clone, Default, Serialize)]

@@ -4,7 +4,9 @@
 
 mod age;
 mod contract;
+mod place;
 mod pointing;
+mod voice;
 
 use contract::{
     decode, encode, CameraInfo, Gestures, Health, InputHealth, OutputHealth, Tracks, STAGE,
@@ -38,6 +40,8 @@ struct Stage<'a> {
     pointing: pointing::Pointing,
     complained: Option<Instant>,
     gestures: Publisher<'a>,
+    aside: Publisher<'a>,
+    place: place::Place,
 }
 
 impl Stage<'_> {
@@ -73,9 +77,21 @@ impl Stage<'_> {
             instance: &self.instance,
             gestures,
         };
-        self.gestures.put(encode(&answer)).wait()?;
-        self.output.published += 1;
+        if self.place.is_ours((run, seq)) {
+            self.gestures.put(encode(&answer)).wait()?;
+            self.output.published += 1;
+        } else {
+            self.aside.put(encode(&answer)).wait()?;
+        }
         Ok(())
+    }
+
+    /// The camera says whether the frames wait for us.
+    fn hear_camera(&mut self, info: &Sample) {
+        let (label, payload) = (info.encoding().to_string(), info.payload().to_bytes());
+        if let Ok(known) = decode::<CameraInfo>(&label, contract::CAMERA_INFO, &payload) {
+            self.lockstep = known.lockstep;
+        }
     }
 
     fn reject(&mut self, why: String) {
@@ -92,9 +108,7 @@ impl Stage<'_> {
 
     fn health(&self) -> Vec<u8> {
         encode(&Health {
-            stamp_ns: SystemTime::now()
-                .duration_since(UNIX_EPOCH)
-                .map_or(0, |since| since.as_nanos() as u64),
+            stamp_ns: now_ns(),
             stage: STAGE,
             instance: &self.instance,
             count: self.beats,
@@ -109,8 +123,16 @@ impl Stage<'_> {
             rss_mb: proc_fields("/proc/self/statm", &[1]).iter().sum::<f64>() * 4096.0 / 1e6,
             inputs: [self.input.clone()],
             outputs: [self.output.clone()],
+            standing_by: self.place.state() != "speaks",
         })
     }
+}
+
+/// Wall clock, Unix nanoseconds.
+fn now_ns() -> u64 {
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos() as u64)
 }
 
 fn main() {
@@ -159,8 +181,14 @@ fn serve(session: &zenoh::Session, robot: &str) -> Result<(), Failure> {
         .unwrap_or_default()
         .trim()
         .to_string();
+    let instance = format!("rust-{}", std::process::id());
+    let stands_by = !matches!(
+        std::env::var("DEIXIS_STAND_BY").as_deref(),
+        Err(_) | Ok("") | Ok("0")
+    );
+    let mut voice = voice::Voice::new(session, robot, &instance)?;
     let mut stage = Stage {
-        instance: format!("rust-{}", std::process::id()),
+        instance,
         host,
         began: Instant::now(),
         beats: 0,
@@ -180,27 +208,33 @@ fn serve(session: &zenoh::Session, robot: &str) -> Result<(), Failure> {
             .declare_publisher(key("gesture/gestures"))
             .encoding(contract::GESTURES)
             .wait()?,
+        aside: session
+            .declare_publisher(key("@standby/gesture/gestures"))
+            .encoding(contract::GESTURES)
+            .wait()?,
+        place: place::Place::new(stands_by),
     };
-    let _alive = session
-        .liveliness()
-        .declare_token(key(&format!("@alive/{STAGE}/{}", stage.instance)))
+    // It is published on change only; who comes later asks for it.
+    let replies = session
+        .get(key("camera/info"))
+        .timeout(Duration::from_secs(1))
         .wait()?;
+    while let Ok(reply) = replies.recv() {
+        if let Ok(info) = reply.result() {
+            stage.hear_camera(info);
+        }
+    }
+    voice.hold_token(&stage.place)?;
     let mut due = Instant::now();
-    while !stopping.load(Ordering::Relaxed) {
+    while !stopping.load(Ordering::Relaxed) && !voice.leaving {
         let sample = tracks.recv_timeout(TURN)?;
         if let Some(info) = infos.try_recv()? {
-            let payload = info.payload().to_bytes();
-            if let Ok(known) = decode::<CameraInfo>(
-                &info.encoding().to_string(),
-                contract::CAMERA_INFO,
-                &payload,
-            ) {
-                stage.lockstep = known.lockstep;
-            }
+            stage.hear_camera(&info);
         }
         if let Some(sample) = sample {
             stage.take(&sample)?;
         }
+        voice.answer(&mut stage.place)?;
         while let Some(query) = asked.try_recv()? {
             query
                 .reply(&health_key, stage.health())

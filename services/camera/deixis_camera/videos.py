@@ -96,6 +96,11 @@ class Video:
         self.live = live
         self.rate_hz = 0.0
 
+    @property
+    def expected(self) -> int:
+        """Pictures of the recording that is open, by its container; 0 where that does not say."""
+        return self._decoder.expected if self._decoder is not None else 0
+
     def read(self) -> Picture | None:
         """The next picture; None at the end of a recording. Raises SourceLost, or SourceBroken for a recording."""
         decoder = self._decoder

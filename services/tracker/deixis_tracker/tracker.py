@@ -51,6 +51,7 @@ class Tracker:
         self._shape: tuple[int, int] = (0, 0)
         self.camera_moves = False  # the camera itself moved just now
         self.is_grey = False  # the picture has no colour, which says then nothing of skin
+        self.skin: Image = np.zeros((1, 1), np.uint8)  # P(skin) of the last frame, 255 is certain; small: see `frame.COARSE`
         self.room_offset_px = (0.0, 0.0)  # how far the room has moved in the middle of the picture since the run began
         self._person_ids, self._track_ids = count(), count()
 
@@ -101,6 +102,7 @@ class Tracker:
             self.is_grey = is_grey(coarse)
         self._follow_camera(coarse, step)
         views = self._view(image, work, coarse, scale)
+        self.skin = views.skin
         self._heads.update(views, self._room, self._motion, self._skin, step)
         persons = self._heads.persons
         if persons:

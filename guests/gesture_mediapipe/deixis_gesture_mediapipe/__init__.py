@@ -1,0 +1,1 @@
+"""Guest: MediaPipe's hand landmarks in the place of gesture."""

@@ -1,0 +1,1 @@
+"""Guest: MediaPipe's FaceMesh and PnP in the place of headpose."""

@@ -1,0 +1,1 @@
+"""Guest: MediaPipe's face detector and hand landmarks in the place of the tracker."""

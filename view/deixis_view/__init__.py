@@ -1,0 +1,1 @@
+"""Shows what Deixis sees, and why it answers as it does."""

@@ -1,0 +1,45 @@
+"""Rerun, where it is installed: it is large, and so an extra."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from deixis_cli.options import CommandError
+
+if TYPE_CHECKING:
+    from .rerun_sink import RerunSink
+
+SUFFIX = ".rrd"
+MISSING = (
+    "Rerun, which draws, is not installed here; 'make rerun' does it, or pip install 'deixis-view[rerun]' (660 MB on disk)"
+)
+
+
+def check_installed() -> None:
+    """Raises CommandError where Rerun is not installed."""
+    if find_spec("rerun") is None:
+        raise CommandError(MISSING)
+
+
+def new_sink(name: str, *, live: bool) -> RerunSink:
+    """A sink whose recording has this name. live: it leaves out what a viewer does not take at once.
+
+    Raises CommandError where Rerun is not installed.
+    """
+    check_installed()
+    from .rerun_sink import RerunSink  # noqa: PLC0415 - it takes a second, and is not there everywhere
+
+    return RerunSink(name=name, live=live)
+
+
+def sink_for_file(path: Path, *, name: str) -> RerunSink:
+    """A sink to a file, which is begun anew. Raises CommandError where that cannot be, or where the name says another kind."""
+    if path.suffix != SUFFIX:
+        raise CommandError(f"'{path}': what is drawn goes to a file of Rerun's, whose name ends in {SUFFIX}")
+    sink = new_sink(name, live=False)
+    try:
+        return sink.to_file(path)
+    except OSError as error:
+        raise CommandError(str(error)) from None
