@@ -28,7 +28,7 @@ setup: .venv/.installed
 	@touch $@
 
 # Stages made with MediaPipe, in an environment of their own within .venv (430 MB). Their libraries are installed as listed, see
-# guests/constraints.txt; the last line holds that they load.
+# guests/constraints.txt; whether they load is tried before the guests themselves come.
 guests: setup $(GUESTS)/.installed
 
 $(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests/%/pyproject.toml,$(MEDIAPIPE))
@@ -37,9 +37,9 @@ $(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests
 	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r guests/constraints.txt
 	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt hatchling editables
 	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-build-isolation -e schemas -e runtime
+	@$(GUESTS)/bin/python -c "from mediapipe import solutions as s; s.face_detection, s.face_mesh, s.hands"
 	@$(GUESTS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
 		$(patsubst %,-e guests/%,$(MEDIAPIPE))
-	@$(GUESTS)/bin/python -c "from mediapipe.solutions import face_detection, face_mesh, hands"
 	@touch $@
 
 # The example clip, whose answer is known; or live: make demo SOURCE=0, SOURCE=clip.mp4, SOURCE=rtsp://... [SITE=site.yaml]

@@ -18,16 +18,15 @@ from .sightings import Image, Sighting
 
 Find = Callable[[str, Image], Sighting | None]
 Show = Callable[[Album, str], None]
-EVERY_S = 0.2
-"""Of a video a picture is looked at so often: a board moves little in between."""
-USUAL_RATE_HZ = 25.0
+EVERY = 5
+"""Of a video each so-many-th picture is looked at: a board moves little in between."""
 LIVE_WANTED = 25
 
 
 def gather(source: PictureSource, find: Find, album: Album, interrupts: Interrupts, console: Console) -> None:
     """Look for the board in all pictures; live until nothing is missing. Ends early on an interrupt."""
     shown = _live(console) if source.live else _progress(source, console)
-    step = 1 if source.live or not source.moving else round(EVERY_S * USUAL_RATE_HZ)
+    step = 1 if source.live or not source.moving else EVERY
     with shown as show:
         for picture in source.pictures:
             if interrupts.requested() or album.full:

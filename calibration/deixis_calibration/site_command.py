@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +151,10 @@ def _source(given: argparse.Namespace, labels: Labels) -> str:
 
 def _write(given: argparse.Namespace, report: SiteReport) -> None:
     """Raises CommandError."""
-    if given.out is None or report.fit is None:
+    if given.out is None:
+        return
+    if report.fit is None:
+        print(f"deixis: --out {given.out} is not written: the mount cannot be judged", file=sys.stderr)
         return
     try:
         write_site(given.site, given.out, report.fit.mount, report.hand, report.head)

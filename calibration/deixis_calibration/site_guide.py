@@ -9,7 +9,7 @@ from typing import Literal
 from deixis_fusion.pointing import GESTURES
 from deixis_schemas.messages import Gestures
 
-HELD_S = 1.5
+HELD_S = 1.0
 WAIT_S = 15.0
 GAP_S = 0.4
 """A stroke that drops out for less goes on."""

@@ -126,7 +126,7 @@ def _ask(one: Asked, session: Session, names: dict[str, str], listener: Listener
     state = _wait(listener, watch.hear, {"held", "given up"})
     begin_ns, end_ns = watch.span_ns
     if state != "held":
-        say("  no pointing was seen; it counts as missed")
+        say("  no pointing was held; what fusion made of these seconds counts")
     else:
         say("  thank you: lower the hand")
         end_s = time.monotonic() + LOWER_S

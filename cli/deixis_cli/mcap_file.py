@@ -2,7 +2,7 @@
 
 MCAP is what robot tools read and write (Foxglove, Rerun, `mcap` of the command line). A channel is a key and a label of the
 payload; its message encoding is `msgpack`, or `json` as generic clients put POIs. A delete is an empty message on a channel
-whose metadata say `deleted`.
+whose metadata say `deleted`. Channels whose metadata say `shown` are for such tools alone, and are not read here.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import CompressionType, Writer
 
 from .raw_message import RawMessage
+from .shown import Show, Shown
 
-LABEL, DELETED = "encoding", "deleted"
+LABEL, DELETED, SHOWN = "encoding", "deleted", "shown"
 # A chunk is what a process that is killed loses; frames fill one each, all else about a second's messages.
 CHUNK_BYTES = 256 << 10
 MAX_RECORD_BYTES = 256 << 20
@@ -41,11 +42,13 @@ class McapFileError(OSError):
 class McapRecorder:
     """Writes a recording. Use as a context manager: what is missing at the end of a file makes it slow to open elsewhere."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises McapFileError where the file is there already or cannot be made."""
+    def __init__(self, path: Path, show: Show | None = None) -> None:
+        """`show` makes what other programs show. Raises McapFileError where the file is there already or cannot be made."""
         self.path = path
         self.messages = 0
+        self._show = show
         self._channels: dict[tuple[str, str, bool], int] = {}
+        self._shown: dict[tuple[str, str], int] = {}
         self._schemas: dict[str, int] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -77,6 +80,8 @@ class McapRecorder:
             self._writer.add_message(
                 channel, message.received_ns, message.payload, message.received_ns, self.messages & 0xFFFFFFFF
             )
+            for shown in self._show(message) if self._show is not None else []:
+                self._writer.add_message(self._shown_channel(shown), message.received_ns, shown.payload, message.received_ns)
         except OSError as error:
             raise _failed(self.path, error) from None
         self.messages += 1
@@ -88,6 +93,16 @@ class McapRecorder:
             kind = "" if message.deleted else _message_encoding(message.encoding)
             self._channels[name] = self._writer.register_channel(message.key, kind, self._schema(message), metadata)
         return self._channels[name]
+
+    def _shown_channel(self, shown: Shown) -> int:
+        name = (shown.topic, shown.schema)
+        if name not in self._shown:
+            if shown.schema not in self._schemas:
+                registered = self._writer.register_schema(shown.schema, shown.schema_encoding, shown.schema_data)
+                self._schemas[shown.schema] = registered
+            schema = self._schemas[shown.schema]
+            self._shown[name] = self._writer.register_channel(shown.topic, shown.encoding, schema, {SHOWN: "true"})
+        return self._shown[name]
 
     def _schema(self, message: RawMessage) -> int:
         """The type that the key carries; 0, which is none, for a key outside the contract and for a delete."""
@@ -141,12 +156,14 @@ class McapReader:
             if isinstance(record, Channel):
                 channels[record.id] = record
             elif isinstance(record, Message):
-                yield self._raw(channels, record)
+                channel = channels.get(record.channel_id)
+                if channel is None:
+                    gone = f"a message of channel {record.channel_id}, which it does not have"
+                    raise McapFileError(f"'{self.path}' is damaged: {gone}")
+                if SHOWN not in channel.metadata:
+                    yield self._raw(channel, record)
 
-    def _raw(self, channels: dict[int, Channel], record: Message) -> RawMessage:
-        channel = channels.get(record.channel_id)
-        if channel is None:
-            raise McapFileError(f"'{self.path}' is damaged: a message of channel {record.channel_id}, which it does not have")
+    def _raw(self, channel: Channel, record: Message) -> RawMessage:
         label, deleted = channel.metadata.get(LABEL, ""), DELETED in channel.metadata
         return RawMessage(channel.topic, label, record.data, record.log_time, deleted)
 
@@ -160,7 +177,7 @@ def keys_in(path: Path) -> set[str]:
         with path.open("rb") as file:
             summary = SeekingReader(file, record_size_limit=MAX_RECORD_BYTES).get_summary()
             if summary is not None:
-                return {channel.topic for channel in summary.channels.values()}
+                return {channel.topic for channel in summary.channels.values() if SHOWN not in channel.metadata}
     except DAMAGED:
         pass  # reading it through says what is wrong
     except OSError as error:

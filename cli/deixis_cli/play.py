@@ -23,6 +23,7 @@ from .mcap_file import McapFileError, McapRecorder
 from .play_end import PlayEnd
 from .raw_message import RawMessage
 from .recorder import Recorder, RecorderError
+from .shown import Show
 
 log = logging.getLogger("deixis-play")
 
@@ -66,11 +67,13 @@ def play(
     name: str = "run",
     on_message: OnMessage | None = None,
     beside: Beside | None = None,
+    show: Show | None = None,
     timeout_s: float | None = None,
 ) -> PlayResult:
     """Start the host's stages, play the source of the camera's settings to its end, and stop them.
 
-    `out` is the folder that gets `NAME.jsonl`; `mcap` a file that gets all as it was sent, frames with `pictures` only.
+    `out` is the folder that gets `NAME.jsonl`; `mcap` a file that gets all as it was sent, frames with `pictures` only, and
+    what `show` makes of it for others to look at.
     `on_message` is called in this thread with (key, message) for each message,
     frames without image bytes. `beside` is entered with the run's session when all stages but the source are ready, and left
     at the end: for those who have something to say in the run themselves. Ends when the source has ended and is answered, has
@@ -85,7 +88,7 @@ def play(
             if out is not None:
                 playback.recorder = stack.enter_context(Recorder(out, name))
             if mcap is not None:
-                playback.mcap = stack.enter_context(McapRecorder(mcap))
+                playback.mcap = stack.enter_context(McapRecorder(mcap, show))
                 playback.pictures = pictures
             playback.interrupts = stack.enter_context(Interrupts())
             playback.run(stack.enter_context(Host(options)))

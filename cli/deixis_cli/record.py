@@ -23,6 +23,7 @@ from .inbox import Inbox
 from .mcap_file import McapFileError, McapRecorder
 from .options import CommandError, add_connect, add_robot, seconds
 from .raw_message import RawMessage
+from .shown import show_by_all
 
 TURN_S = 0.1
 SILENT_S = 3.0
@@ -38,6 +39,8 @@ def register(subparsers: Any) -> None:
     add_robot(parser)
     add_connect(parser)
     parser.add_argument("--no-pictures", action="store_true", help="leave out the frames: small, and shows nobody")
+    parser.add_argument("--site", type=Path, metavar="FILE", help="site file: its walls are drawn for those who look at it")
+    parser.add_argument("--plain", action="store_true", help="what was sent alone, and nothing drawn for Foxglove")
     parser.add_argument("--seconds", type=seconds, metavar="N", help="stop after so long (default: on Ctrl-C)")
     parser.set_defaults(run=run)
 
@@ -50,6 +53,7 @@ def run(given: argparse.Namespace) -> int:
     if given.file.exists():
         raise CommandError(f"'{given.file}' exists already; a recording is never written over")
     until_s = None if given.seconds is None else time.monotonic() + given.seconds
+    show = None if given.plain else show_by_all(given.site)
     console = Console(stderr=True)
     with ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
@@ -58,7 +62,7 @@ def run(given: argparse.Namespace) -> int:
         for key in recorded_keys(given.robot, pictures=not given.no_pictures):
             stack.callback(session.declare_subscriber(key, inbox.store).undeclare)
         try:
-            with McapRecorder(given.file) as recorder, console.status("recording") as status:
+            with McapRecorder(given.file, show) as recorder, console.status("recording") as status:
                 heard = Recording(given.robot, given.connect, recorder, inbox, status, pictures=not given.no_pictures)
                 heard.record(session, interrupts, until_s)
         except McapFileError as error:

@@ -19,6 +19,7 @@ from . import wording
 from .live_view import view_for
 from .options import DEMO_ROBOT, CommandError, add_host, add_json, add_robot, host_options, quoted, read_site, seconds
 from .play import PlayResult, play
+from .shown import show_by_all
 from .source import Source, read_source
 from .views import file_view
 
@@ -68,7 +69,8 @@ def out_options(given: argparse.Namespace, name: str, played: Path | None = None
         if played is not None and mcap.samefile(played):
             raise CommandError(f"'{mcap}' is what is to be played, and would be written over; give another --out")
         _remove(mcap)
-    return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures}
+    show = None if mcap is None else show_by_all(given.site)
+    return {"name": name, "out": given.out, "mcap": mcap, "pictures": given.pictures, "show": show}
 
 
 def _remove(mcap: Path) -> None:

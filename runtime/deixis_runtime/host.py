@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Self
@@ -42,6 +42,9 @@ log = logging.getLogger("deixis-supervisor")
 POLL_S = 0.02
 START_S = 30.0
 HELD_PERIOD_S = 0.5
+GUEST_READY_S, GUEST_SILENT_S = 30.0, 3.0
+"""What is borne where guests are among the stages: their libraries take seconds to load, and one frame of a large model on a
+busy machine more than we bear of our own stages."""
 ROUTER = "router"
 ROUTER_COMMAND = (sys.executable, "-m", "deixis_runtime.router")
 SOURCE = topics.FRAME.stage
@@ -119,6 +122,10 @@ class Host:
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix=PREFIX)))
         self.endpoint = f"unixsock-stream/{folder}/router.sock"
         patience = self.options.patience
+        if self.options.guests:
+            patience = replace(
+                patience, ready_s=max(patience.ready_s, GUEST_READY_S), silent_s=max(patience.silent_s, GUEST_SILENT_S)
+            )
         notifications = self._stack.enter_context(Notifications(folder / "notify.sock", patience.silent_s))
         self._watch = HangWatch(notifications, patience)
         self.supervisor.environment = notifications.environment() | {SUPERVISED_BY: str(os.getpid())}

@@ -16,6 +16,8 @@ Picture = NDArray[np.uint8]
 CROP_PX = 224
 CROP_FACE_WIDTHS = 2.6
 SMALLEST_CROP_PX = 16
+FARTHEST_PX = 32000.0
+"""Pixels that the contract holds."""
 MODELS = {"lite": 0, "full": 1}
 
 
@@ -58,7 +60,9 @@ class HandReader:
             return None
         points = np.array([(mark.x * side + left, mark.y * side + top) for mark in result.multi_hand_landmarks[0].landmark])
         metric = np.array([(mark.x, mark.y, mark.z) for mark in result.multi_hand_world_landmarks[0].landmark])
-        return HandRead(points, metric)
+        if not (np.isfinite(points).all() and np.isfinite(metric).all()):
+            return None
+        return HandRead(points.clip(-FARTHEST_PX, FARTHEST_PX), metric)
 
     def _graph(self, track_id: int) -> Any | None:
         if track_id not in self._graphs:

@@ -1,9 +1,8 @@
-"""Yaw and distance of a head from the landmarks of its face: solvePnP, and the mesh's own axes. Pure."""
+"""Yaw of a head from the landmarks of its face: solvePnP, and the mesh's own axes. Pure."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -34,24 +33,18 @@ MOST_ROLL_DEG = 50.0
 """A mesh that lies on its side is one that has slipped: nobody visits so."""
 
 
-@dataclass(frozen=True)
-class HeadSight:
-    """A head: yaw relative to the line head -> camera, positive toward image right, degrees; distance, metres."""
+def yaw_of(mesh: Floats, pinhole: Pinhole) -> float | None:
+    """Yaw of the head under a mesh (n, 3), pixels, z in the same scale and away from the camera; none where it cannot be one.
 
-    yaw_deg: float
-    distance_m: float
-
-
-def head_of(mesh: Floats, pinhole: Pinhole) -> HeadSight | None:
-    """The head under a mesh (n, 3), pixels, z in the same scale and away from the camera; none where it cannot be one.
+    Relative to the line head -> camera, positive toward image right, degrees.
 
     Of yaws, PnP falls short by up to 7 degrees beyond 55, and the mesh's own axes exceed by up to 5: the mean is taken. Pitch
-    and roll are not told: their zero is 6 to 12 degrees off, by yaw.
+    and roll are not told: their zero is 6 to 12 degrees off, by yaw; nor is the distance: the tracker's box says it better.
     """
     solved = _solve(mesh, pinhole)
     if solved is None:
         return None
-    turn, (x, y, z) = solved
+    turn, (x, z) = solved
     nose = -turn[:, 2]
     by_pnp = math.atan2(nose[0], -nose[2]) - math.atan2(-x, z)
     own = np.cross(mesh[LEFT_EYE] - mesh[RIGHT_EYE], mesh[CHIN] - mesh[BROW])
@@ -62,7 +55,7 @@ def head_of(mesh: Floats, pinhole: Pinhole) -> HeadSight | None:
     if z <= 0 or roll_deg > MOST_ROLL_DEG or not math.isfinite(by_pnp + by_mesh):
         return None
     apart = (by_pnp - by_mesh + math.pi) % (2 * math.pi) - math.pi
-    return HeadSight(math.degrees(by_mesh + apart / 2), math.sqrt(x * x + y * y + z * z) / 1e3)
+    return math.degrees(by_mesh + apart / 2)
 
 
 def sigma_deg(yaw_deg: float) -> float:
@@ -70,8 +63,8 @@ def sigma_deg(yaw_deg: float) -> float:
     return float(np.interp(abs(yaw_deg), SIGMA_YAWS_DEG, SIGMAS_DEG))
 
 
-def _solve(mesh: Floats, pinhole: Pinhole) -> tuple[Floats, tuple[float, float, float]] | None:
-    """Rotation of the generic head to camera axes, and where it is, mm."""
+def _solve(mesh: Floats, pinhole: Pinhole) -> tuple[Floats, tuple[float, float]] | None:
+    """Rotation of the generic head to camera axes, and how far aside and away it is, mm."""
     matrix = np.array([[pinhole.focal_px, 0, pinhole.centre_x_px], [0, pinhole.focal_px, pinhole.centre_y_px], [0, 0, 1]])
     model, pixels = np.array(list(GENERIC_HEAD_MM.values())), np.ascontiguousarray(mesh[list(GENERIC_HEAD_MM), :2])
     try:
@@ -80,5 +73,5 @@ def _solve(mesh: Floats, pinhole: Pinhole) -> tuple[Floats, tuple[float, float, 
         return None
     if not solved:
         return None
-    x, y, z = (float(value) for value in place.ravel())
-    return np.asarray(cv2.Rodrigues(turn)[0]), (x, y, z)
+    x, _, z = (float(value) for value in place.ravel())
+    return np.asarray(cv2.Rodrigues(turn)[0]), (x, z)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from deixis_runtime.lens import Lens
 from deixis_schemas.messages import HeadPose, Track
 
-from .angles import head_of
+from .angles import yaw_of
 from .config import HeadposeConfig
 from .head import Head
 from .mesh import FaceMesh, Picture
@@ -40,9 +40,8 @@ class HeadPoseEstimator:
 
     def _look(self, image: Picture, person_id: int, face: Track, lens: Lens, size: tuple[int, int]) -> HeadPose:
         head = self._heads.setdefault(person_id, Head(person_id, self._config))
-        pinhole = lens.pinhole_at(face.centroid_px, size)
         mesh = self._mesh_of(person_id).find(image, face.bbox_px)
-        return head.look(None if mesh is None else head_of(mesh, pinhole), pinhole.focal_px)
+        return head.look(None if mesh is None else yaw_of(mesh, lens.pinhole_at(face.centroid_px, size)))
 
     def _mesh_of(self, person_id: int) -> FaceMesh:
         if person_id not in self._meshes:

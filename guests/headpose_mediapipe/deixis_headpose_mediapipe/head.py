@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import HeadPose
+from deixis_schemas.messages import HeadPose, Side
 
-from .angles import HeadSight, sigma_deg
+from .angles import sigma_deg
 from .config import HeadposeConfig
-
-MAX_FACE_PX = 8192.0
 
 
 class Head:
@@ -21,24 +18,18 @@ class Head:
         self._agreed = 0
         self._was_read = False
 
-    def look(self, sight: HeadSight | None, focal_px: float) -> HeadPose:
-        """The answer to the next look, through a lens of that focal length; `sight` is none where no face was read."""
-        if sight is None:
+    def look(self, yaw_deg: float | None) -> HeadPose:
+        """The answer to the next look; `yaw_deg` is none where no face was read."""
+        if yaw_deg is None:
             self._yaw_deg, self._agreed = None, 0
             return HeadPose(person_id=self._person_id, status="lost" if self._was_read else "initialising")
-        near = self._yaw_deg is None or abs(sight.yaw_deg - self._yaw_deg) <= self._config.jump_deg
+        near = self._yaw_deg is None or abs(yaw_deg - self._yaw_deg) <= self._config.jump_deg
         self._agreed = self._agreed + 1 if near else 1
-        self._yaw_deg = sight.yaw_deg
+        self._yaw_deg = yaw_deg
         if self._agreed < self._config.looks_to_start:
             return HeadPose(person_id=self._person_id, status="lost" if self._was_read else "initialising")
         self._was_read = True
-        width = focal_px * FACE_WIDTH_M / sight.distance_m
-        told = {"person_id": self._person_id, "face_width_px": width if 0 < width <= MAX_FACE_PX else None}
-        if abs(sight.yaw_deg) > self._config.reach_deg:
-            side = "left" if sight.yaw_deg > 0 else "right"
-            return HeadPose.model_validate(
-                {**told, "status": "out_of_range", "side": side, "beyond_deg": self._config.reach_deg}
-            )
-        return HeadPose.model_validate(
-            {**told, "status": "tracking", "yaw_deg": sight.yaw_deg, "yaw_sigma_deg": sigma_deg(sight.yaw_deg)}
-        )
+        if abs(yaw_deg) > self._config.reach_deg:
+            side: Side = "left" if yaw_deg > 0 else "right"
+            return HeadPose(person_id=self._person_id, status="out_of_range", side=side, beyond_deg=self._config.reach_deg)
+        return HeadPose(person_id=self._person_id, status="tracking", yaw_deg=yaw_deg, yaw_sigma_deg=sigma_deg(yaw_deg))

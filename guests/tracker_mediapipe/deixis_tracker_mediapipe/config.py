@@ -25,4 +25,4 @@ class TrackerConfig(StageConfig):
         description="Which of the two models of the wheel reads hands. full takes twice the time.",
     )
     forget_face_s: float = Field(default=1.5, gt=0, le=10, description="A person whose face is unseen for longer is forgotten.")
-    forget_hand_s: float = Field(default=0.3, gt=0, le=10, description="A hand unseen for longer is forgotten.")
+    forget_hand_s: float = Field(default=0.15, gt=0, le=10, description="A hand unseen for longer is forgotten.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import cv2
@@ -32,8 +33,8 @@ class FaceFinder:
             box, points = detection.location_data.relative_bounding_box, detection.location_data.relative_keypoints
             side = box.width * width
             middle = (points[RIGHT_EAR].x + points[LEFT_EAR].x) / 2, (points[RIGHT_EAR].y + points[LEFT_EAR].y) / 2
-            if side > 0:
-                nose = (points[NOSE].x - middle[0]) * width / side
+            nose = (points[NOSE].x - middle[0]) * width / side if side > 0 else math.nan
+            if all(map(math.isfinite, (*middle, nose))):
                 found.append(FaceSeen((middle[0] * width, middle[1] * height), side, nose, float(detection.score[0])))
         return found
 

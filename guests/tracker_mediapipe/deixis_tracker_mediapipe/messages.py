@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from deixis_schemas.messages import FrontalFace, KindProbabilities, Track
+from deixis_schemas.messages import MAX_SIDE_PX, FrontalFace, KindProbabilities, Track
 
 from .persons import HandTrack, Person, is_frontal, left_odds, sigmoid
 from .seen import Point
@@ -22,7 +22,7 @@ def tracks_of(person: Person) -> list[Track]:
 
 def _face(person: Person) -> Track:
     x, y = _bounded(person.centre)
-    width, seen = person.width, person.face
+    width, seen = min(person.width, MAX_SIDE_PX / FACE_HEIGHT), person.face
     frontal = FrontalFace(centre_px=(x, y), width_px=width) if seen is not None and is_frontal(seen) else None
     return Track(
         track_id=person.track_id,
