@@ -29,7 +29,8 @@ from deixis_cli.options import quoted
 from deixis_cli.play import play
 from deixis_evaluation.clip_score import ClipScore
 from deixis_evaluation.clips import Clip, ClipError, load_clips
-from deixis_evaluation.evaluate import EvaluationOptions, Interrupted, evaluate_clip
+from deixis_evaluation.evaluate import EvaluationOptions, evaluate_clip
+from deixis_evaluation.interrupted import Interrupted
 from deixis_evaluation.machine import describe_machine, say_machine
 from deixis_evaluation.summary import Summary, summarise
 from deixis_runtime.host import HostOptions

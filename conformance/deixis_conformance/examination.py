@@ -39,6 +39,7 @@ class Examination:
         self._lock = threading.Lock()
         self._heard: list[Heard] = []
         self._heard_bytes = 0
+        self._unheard = 0
         self._declared: list[Any] = []
         # No run of ours may be one that the stage knows from elsewhere.
         self._run = time.time_ns() // 1_000_000
@@ -66,7 +67,8 @@ class Examination:
         self._take()
         current = Phase(name, time.monotonic())
         yield current
-        current.heard += self._take()
+        heard, current.unheard = self._take()
+        current.heard += heard
         current.ended_s = time.monotonic()
         current.running = self._subject_runs()
         self.phases.append(current)
@@ -194,12 +196,16 @@ class Examination:
             self._heard_bytes += len(payload)
             if len(self._heard) < MAX_HEARD and self._heard_bytes < MAX_BYTES:
                 self._heard.append(Heard(str(sample.key_expr), str(sample.encoding), payload, at_s))
+            else:
+                self._unheard += 1
 
-    def _take(self) -> list[Heard]:
+    def _take(self) -> tuple[list[Heard], int]:
+        """What came since the last call, and how many messages came beyond what is kept."""
         with self._lock:
             heard, self._heard = self._heard, []
+            unheard, self._unheard = self._unheard, 0
             self._heard_bytes = 0
-        return heard
+        return heard, unheard
 
 
 MAX_ONCE = 32

@@ -36,7 +36,10 @@ class Fed:
 
 @dataclass
 class Phase:
-    """A stretch of time. fed: what was given; heard: what came; running: whether the stage's process did so at its end."""
+    """A stretch of time. fed: what was given; heard: what came; running: whether the stage's process did so at its end.
+
+    unheard: messages beyond what is kept of a phase.
+    """
 
     name: str
     began_s: float
@@ -44,6 +47,7 @@ class Phase:
     fed: list[Fed] = field(default_factory=list)
     heard: list[Heard] = field(default_factory=list)
     running: bool = True
+    unheard: int = 0
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ OWN_KEYS = "publish on deixis/{{robot}}/{stage}/... alone: two voices on one key
 LABELS = "set the encoding of each put: application/msgpack;Type/version (schemas/contract/topics.md)"
 SCHEMA = "compare with schemas/contract/*.schema.json, and with the golden bytes beside them"
 PRODUCER = "name the stage and the instance of the liveliness token in every message"
+FLOOD = "publish once a frame, and once a second for health; a check keeps 20000 messages or 512 MiB of a phase"
 SHOWN = 3
 
 
@@ -32,7 +33,14 @@ def check_payloads(stage: str, phases: Sequence[Phase]) -> list[Result]:
         ),
         judged("labels", f"{len(good)} messages carry the label of their type", _some(labels), LABELS),
         judged("schema", f"{len(good)} messages keep their schema", _some(broken), SCHEMA),
+        *_flood(phases),
     ]
+
+
+def _flood(phases: Sequence[Phase]) -> list[Result]:
+    """A failure where more came than is kept: what was not heard was not judged."""
+    unheard = sum(phase.unheard for phase in phases)
+    return [Result("flood", "failed", f"{unheard} messages came beyond those that were judged", FLOOD)] if unheard else []
 
 
 def check_producer(stage: str, phases: Sequence[Phase], instance: str | None) -> list[Result]:

@@ -25,7 +25,7 @@ from deixis_view.known import Known
 from deixis_view.scene import UNRECORDED, Scene
 from headless_browser import needs_chromium, page
 from rerun_ready import columns, needs_rerun
-from running import BIN, CLIP, POINTED_AT, SITE, command, free_port, process, wait_until
+from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, wait_until
 from stuck_viewer import StuckSink
 
 FRAMES = 126
@@ -225,6 +225,24 @@ def test_a_viewer_that_is_stopped_is_left_out_and_takes_part_again_when_it_goes_
         wait_until(lambda: draw(sink, 300), "the viewer takes part again", 30.0)
         assert sink.left_out >= 280
         assert sink.close()
+
+
+@needs_rerun
+def test_the_viewer_ends_with_a_command_that_is_killed(run, tmp_path):
+    log = tmp_path / "log"
+    with process(command("deixis", "view", run / "pointing.mcap", "--web", "--port", 0), log) as child:
+        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", 60.0, log)
+        (viewer,) = children(child.pid)
+        child.kill()
+    wait_until(lambda: not alive(viewer), "the viewer is gone", 10.0)
+
+
+def alive(pid):
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def rss_kb():

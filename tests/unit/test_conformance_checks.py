@@ -1,5 +1,6 @@
 """What the checks of a stage make of what was fed and heard."""
 
+from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
@@ -139,6 +140,13 @@ def test_a_wrong_payload_is_named_with_its_key(message, failed, named):
     assert wrong.name == failed
     assert named in wrong.found
     assert "deixis/r1/" in wrong.found
+
+
+def test_messages_that_were_too_many_to_be_judged_fail():
+    flooded = replace(phase([]), unheard=7)
+    (flood,) = [result for result in check_payloads("gesture", [phase([]), flooded]) if result.name == "flood"]
+    assert (flood.outcome, flood.found) == ("failed", "7 messages came beyond those that were judged")
+    assert "flood" not in outcomes(check_payloads("gesture", [phase([])]))
 
 
 def test_a_producer_has_one_name_which_is_its_tokens():

@@ -50,17 +50,8 @@ class ViewerProcess:
 
     def __enter__(self) -> Self:
         """Start it, and wait until it listens. Raises ViewerError."""
-        argv = [
-            sys.executable,
-            "-m",
-            "rerun_cli",
-            "--bind",
-            LOOPBACK,
-            "--port",
-            str(self.port),
-            "--server-memory-limit",
-            MEMORY,
-        ]
+        argv = [sys.executable, "-m", "deixis_view.viewer_start", str(os.getpid())]
+        argv += ["--bind", LOOPBACK, "--port", str(self.port), "--server-memory-limit", MEMORY]
         if self._window:
             argv += ["--memory-limit", MEMORY, "--hide-welcome-screen", "--expect-data-soon"]
         else:
@@ -78,7 +69,7 @@ class ViewerProcess:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # The whole group: the package starts its program as a child.
+        # The whole group: where the kernel cannot end it with us, the package starts its program as a child.
         for number in (signal.SIGTERM, signal.SIGKILL):
             try:
                 os.killpg(self._child.pid, number)
