@@ -50,7 +50,7 @@ def register(subparsers: Any) -> None:
     page = actions.add_parser("edit", help="place them on the map in a page", description=poi_edit.__doc__)
     poi_edit.add_options(page)
     for edit in (add, move, remove, many, page):
-        edit.add_argument("--by", type=_plain, default=who(), metavar="NAME", help="who edits (default: %(default)s)")
+        edit.add_argument("--by", type=_plain, default=who(), metavar="NAME", help="who edits (default: user@host)")
 
 
 def run_list(given: argparse.Namespace) -> int:
