@@ -264,3 +264,16 @@ def test_it_says_what_is_missing(tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "clip.mp4").exists()
     monkeypatch.setattr("deixis_view.installed.find_spec", lambda _: None)
     assert "make rerun" in said("view", "--robot", "r1", "--out", tmp_path / "out.rrd")
+
+
+@needs_rerun
+def test_a_recording_that_cannot_be_read_costs_no_file_and_opens_no_page(tmp_path, capsys):
+    out, nothing, words = tmp_path / "out.rrd", tmp_path / "nothing.mcap", tmp_path / "words.mcap"
+    out.write_bytes(b"drawn before")
+    words.write_text("no recording")
+    for recording, cause in ((nothing, "No such file"), (words, "no MCAP file")):
+        assert main(["view", str(recording), "--out", str(out)]) == 1
+        assert cause in capsys.readouterr().err
+        assert main(["view", str(recording), "--web", "--port", "0"]) == 1
+        assert capsys.readouterr().out == ""
+    assert out.read_bytes() == b"drawn before"

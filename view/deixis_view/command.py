@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import zenoh
 from deixis_cli.gets import get_all, get_pois, get_state, get_timed_healths
 from deixis_cli.mcap_file import McapFileError
 from deixis_cli.options import CommandError, add_connect, seconds
+from deixis_cli.raw_message import RawMessage
 from deixis_runtime.clock_offset import estimate
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import open_client
@@ -71,15 +73,16 @@ def run(given: argparse.Namespace) -> int:
     try:
         with ExitStack() as stack:
             interrupts = stack.enter_context(Interrupts())
-            # First: where nothing can be reached, no window opens and no file is begun.
+            # First: where nothing can be reached or read, no window opens and no file is begun.
             session = stack.enter_context(open_client(given.connect, shared_memory=False)) if given.file is None else None
+            raws = _begun(given) if given.file is not None else None
             viewer, sink = stack.enter_context(_sink(given))
             scene = scene_of(known, draw_options(given), live=given.file is None)
             painter = Painter(scene, sink)
             show = Showing(viewer, interrupts, until_s)
-            if session is None:
-                _recorded(given, painter, show)
-            else:
+            if raws is not None:
+                _recorded(given, raws, painter, show)
+            elif session is not None:
                 _live(given, session, scene, painter, show)
             if not sink.close() and given.out is not None:
                 raise CommandError(f"'{given.out}' could not be written to its end")
@@ -136,12 +139,19 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
         yield viewer, sink.to_viewer(viewer.url)
 
 
-def _recorded(given: argparse.Namespace, painter: Painter, show: Showing) -> None:
+def _begun(given: argparse.Namespace) -> Iterator[RawMessage]:
+    """A recording's messages, the first of them read. Raises McapFileError, CommandError where there is none to draw."""
+    raws = messages(given.file, given.pictures)
+    first = next(raws, None)
+    if first is None:
+        raise CommandError(f"'{given.file}' holds no message")
+    return chain((first,), raws)
+
+
+def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Painter, show: Showing) -> None:
     """Draw a recording, and stay with its viewer. Raises McapFileError, CommandError, ViewerError."""
     with Console(stderr=True).status(f"drawing {given.file}"):
-        count = paint_all(messages(given.file, given.pictures), painter.take, show.stopped)
-    if not count:
-        raise CommandError(f"'{given.file}' holds no message")
+        paint_all(raws, painter.take, show.stopped)
     print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
     if given.out is not None:
         print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)

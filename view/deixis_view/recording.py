@@ -79,12 +79,9 @@ class _ClipPictures:
             raise CommandError(f"'{self._path}': no clip that can be played")
 
 
-def paint_all(raws: Iterator[RawMessage], take: Callable[[RawMessage], None], stopped: Callable[[], bool]) -> int:
-    """Take all to the painter until it is over, or somebody stops; how many."""
-    count = 0
+def paint_all(raws: Iterator[RawMessage], take: Callable[[RawMessage], None], stopped: Callable[[], bool]) -> None:
+    """Take all to the painter until it is over, or somebody stops."""
     for raw in raws:
         if stopped():
             break
         take(raw)
-        count += 1
-    return count
