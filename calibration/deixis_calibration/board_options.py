@@ -35,8 +35,12 @@ def board_of(given: argparse.Namespace) -> Board:
         raise CommandError(f"--squares {given.squares}: not of the form 7x5")
     if given.pattern == "chessboard" and given.marker is not None:
         raise CommandError("--marker is for --pattern charuco")
-    marker = 0.0 if given.pattern == "chessboard" else given.marker or MARKER_SHARE * given.square
+    marker = 0.0 if given.pattern == "chessboard" else _marker_of(given)
     try:
         return Board(given.pattern, int(sides[1]), int(sides[2]), given.square, marker, given.dictionary)
     except BoardError as error:
         raise CommandError(str(error)) from None
+
+
+def _marker_of(given: argparse.Namespace) -> float:
+    return MARKER_SHARE * given.square if given.marker is None else float(given.marker)

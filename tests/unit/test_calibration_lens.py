@@ -87,6 +87,12 @@ def test_the_board_that_is_printed_is_found_with_all_corners(tmp_path):
     assert main(["calibrate", "board", "--out", str(tmp_path / "board.png")]) == 1
 
 
+def test_markers_of_no_size_are_refused_and_not_taken_for_the_default(tmp_path, capsys):
+    assert main(["calibrate", "board", "--marker", "0", "--out", str(tmp_path / "board.png")]) == 1
+    assert "markers of 0 m" in capsys.readouterr().err
+    assert not (tmp_path / "board.png").exists()
+
+
 def test_pictures_without_a_board_are_refused_by_a_sentence_and_nothing_is_written(tmp_path, capsys):
     for number in range(3):
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full(SIZE[::-1], 90, np.uint8))
