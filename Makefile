@@ -48,7 +48,7 @@ demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
 		--registry $$registry --expect P3 --lineup "$(LINEUP)" --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
-		printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status
+		[ ! -f $(DEMO_RECORDING) ] || printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status
 else
 	@echo "To see it while it runs, from another terminal: make rerun, once, then $(BIN)/deixis view --robot demo (or with --web)"
 	@# By the environment: a URL with '&' or a name with blanks must not be read by the shell.

@@ -30,11 +30,12 @@ def parser(wanted: str | None = None) -> argparse.ArgumentParser:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command. Exit status 0 when it did its job; 1 with the cause on standard error; 2 for bad usage."""
+    """Run one command. Exit status 0 when it did its job; 1 with the cause on standard error; 2: bad usage; 130: Ctrl-C."""
     argv = sys.argv[1:] if argv is None else argv
-    given = parser(argv[0] if argv else None).parse_args(argv)
-    setup_logging()
     try:
+        # Within: a command's imports take seconds on a busy machine, and Ctrl-C in them deserves no traceback.
+        given = parser(argv[0] if argv else None).parse_args(argv)
+        setup_logging()
         return int(given.run(given))
     except (CommandError, HostFailed, Unreachable) as error:
         print(f"deixis: {error}", file=sys.stderr)

@@ -14,7 +14,7 @@ from deixis_schemas.messages import OfFrame, Voice
 from deixis_schemas.topics import By, Topic
 
 from .gets import get_all
-from .newcomer import Newcomer
+from .newcomer import GivenNewcomer, Newcomer
 from .standby_exam import StandbyExam
 from .swap_count import Cost, SwapCount
 from .system import alive_processes
@@ -114,6 +114,8 @@ class SwapProcedure:
     def await_standing_by(self, newcomer: Newcomer) -> str:
         """The newcomer's instance, once it stands by."""
         old = self.heard_now()
+        if newcomer.instance in old:
+            raise Refusal(f"{newcomer.instance} is {self._stage} already: --instance names one that stands by for its place")
         before = set() if newcomer.instance or not newcomer.ours else self.standing_by()
         if before:
             raise Refusal(
@@ -130,7 +132,16 @@ class SwapProcedure:
             return next(iter(standing if newcomer.instance is None else standing & {newcomer.instance}), "")
 
         who = newcomer.instance or "the newcomer"
+        if isinstance(newcomer, GivenNewcomer):
+            self._say_if_absent(who)
         return self._await(found, newcomer, START_WITHIN_S, f"{who} does not stand by", LOOK_S)
+
+    def _say_if_absent(self, instance: str) -> None:
+        """A name that is misspelt, or a process that was not started, must not look like a hang."""
+        standing = self.standing_by()
+        if instance not in standing:
+            others = ", ".join(sorted(standing)) or "nobody"
+            self._advise(f"{instance} does not stand by for {self._stage} ({others} does); waiting {START_WITHIN_S:g} s for it")
 
     def examine(self, old: str, new: str, newcomer: Newcomer) -> None:
         """Look at what the newcomer says aside, beside the old one's answers."""

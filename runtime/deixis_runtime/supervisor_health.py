@@ -33,5 +33,7 @@ def _note(process: Process, now_s: float) -> str:
     if process.replaced:
         since_s = now_s - process.ended_s
         return f"{process.name}: another process has its place since {since_s:.0f} s; it is started again when that is gone"
+    if process.once:
+        return f"{process.name}: ended {now_s - process.ended_s:.0f} s ago ({process.last_end}); it is not started again"
     often = f"started again {restarts} time{'s' if restarts > 1 else ''}" if restarts else "waits to be started again"
     return f"{process.name}: {often}; the last end, {now_s - process.ended_s:.0f} s ago: {process.last_end}"

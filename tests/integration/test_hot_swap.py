@@ -86,3 +86,18 @@ def test_a_command_that_ends_or_knows_nothing_of_standing_by_is_refused_and_the_
     assert "the newcomer has ended (status 78; its message stands in the supervisor's log)" in wrong.stderr
     assert len(listener.instances()) == 1
     assert listener.unanswered() == []
+
+
+def test_an_instance_that_has_the_place_or_is_not_there_is_said_at_once(running, tmp_path):
+    old = running.wait_until(lambda: headpose_source(running).get("producers"), "a headpose")[0].removeprefix("headpose/")
+    heard = swap(running, "headpose", "--instance", old, timeout=30)
+    assert (heard.returncode, heard.stdout) == (1, "")
+    assert f"{old} is headpose already" in heard.stderr
+    argv = ["swap", "headpose", "--instance", "nobody", "--robot", running.robot, "--connect", running.endpoint]
+    log = tmp_path / "swap"
+    with process(command("deixis", *argv), log) as child:
+        wait_until(lambda: "nobody does not stand by" in log.read_text() or child.poll() is not None, "a word", 30, log)
+        assert child.poll() is None, tail(log)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(20) == 1
+    assert f"stopped; heard now: {old}" in log.read_text()

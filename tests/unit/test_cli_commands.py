@@ -87,3 +87,11 @@ def test_every_command_that_is_advised_exists():
     advised = {name for text in texts for name in re.findall(r"[`':] ?deixis ([a-z][a-z-]*)", text)}
     assert {"up", "run", "doctor", "poi"} <= advised
     assert advised <= COMMANDS
+
+
+def test_ctrl_c_while_a_command_is_being_loaded_is_no_traceback(monkeypatch):
+    def interrupted(_wanted):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("deixis_cli.main.parser", interrupted)
+    assert command_line.main(["swap"]) == 130

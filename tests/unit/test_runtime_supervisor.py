@@ -87,3 +87,6 @@ def test_what_is_said_of_the_children():
     assert account.notes == {"fusion": "fusion: started again 2 times; the last end, 12 s ago: killed by SIGKILL"}
     assert account.restarts == {"fusion": 2, "gesture": 5}
     assert account_of([well], 100.0).state == "ok"
+    spare = Process("headpose newcomer", SLEEP, started=1, last_end="status 78", ended_s=70.0, once=True)
+    said = "headpose newcomer: ended 30 s ago (status 78); it is not started again"
+    assert account_of([spare], 100.0).notes == {"headpose newcomer": said}
