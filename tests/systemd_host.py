@@ -151,8 +151,13 @@ class SystemdHost:
         return self.run(["systemctl", "show", "--value", "-p", name, unit]).stdout.strip()
 
     def commands(self) -> list[str]:
-        """Names of all that runs on the host, but for systemd and the one that looks."""
-        return sorted({*self.run(["ps", "-e", "-o", "comm="]).stdout.split()} - {"systemd", "ps", "(sd-pam)"})
+        """Names of all that runs on the host, but for systemd and the one that looks.
+
+        The ended are left out: who was started from outside has its parent there, which may be slow to take note of it.
+        """
+        rows = [line.split(maxsplit=1) for line in self.run(["ps", "-e", "-o", "stat=,comm="]).stdout.splitlines()]
+        running = {name.strip() for state, name in rows if not state.startswith("Z")}
+        return sorted(running - {"systemd", "ps", "(sd-pam)"})
 
     def _boot(self) -> None:
         for cgroup in self._cgroups:
@@ -206,7 +211,7 @@ def write_environment(folder: Path) -> None:
     (folder / "bin").mkdir()
     (folder / "bin" / "python").symlink_to(f"{PYTHON}/bin/{version}")
     for name in ("cli", *SERVICES):
-        # The very functions that pip would name: with another of the same module `deixis watch` did not end by SIGTERM, once.
+        # The very functions that pip would name.
         for script, called in tomllib.loads((ROOT / name / "pyproject.toml").read_text())["project"]["scripts"].items():
             module, function = called.split(":")
             path = folder / "bin" / script

@@ -157,9 +157,9 @@ def wait_for_an_answer(host):
         try:
             assert any(is_right(json.loads(line)) for line in watch.stdout), host.log.read_text()[-3000:]
         finally:
-            watch.terminate()
-            host.run(["pkill", "-x", "deixis"], check=False)  # that was `nsenter`; the command itself lived on
-    wait_until(lambda: "deixis" not in host.commands(), "the command ends by SIGTERM", 10, host.log)
+            host.run(["pkill", "-x", "deixis"])
+            watch.stdout.close()
+            watch.wait(10)  # it is nsenter, which ends with the command
 
 
 def is_right(line):

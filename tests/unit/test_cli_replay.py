@@ -168,7 +168,7 @@ def test_a_recording_is_not_replayed_into_itself_and_what_lies_beside_it_stays(t
 
 def test_a_second_run_into_one_folder_begins_its_files_anew(tmp_path):
     path = recorded(tmp_path / "a.mcap", "CameraInfo", "Frame")
-    options = out_options(argparse.Namespace(out=tmp_path, pictures=False), "a")
+    options = out_options(argparse.Namespace(site=None, out=tmp_path, pictures=False), "a")
     assert options["mcap"] == path
     with McapRecorder(options["mcap"]):
         pass
