@@ -126,9 +126,9 @@ class SupervisedNewcomer:
         self._key = topics.VOICE.key(robot, stage=topics.SUPERVISOR, id=told.instance)
 
     def ended(self) -> str:
-        """How it has ended, as its supervisor says."""
+        """How it has ended, as its supervisor says. One that is heard has not: when the old one is gone it is no newcomer."""
         told, why = self._ask("")
-        return "" if told is not None else why
+        return "" if told is not None or self.instance in self._heard() else why
 
     def keep(self, heard: Callable[[], set[str]]) -> None:
         """Leave it alone at the end where it is heard."""

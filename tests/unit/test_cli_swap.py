@@ -1,11 +1,14 @@
 """What `deixis swap` makes of what it hears: whether a newcomer is fit, and what a swap has cost."""
 
 import pytest
+from deixis_cli import newcomer as newcomers
+from deixis_cli.gets import Refusal
 from deixis_cli.main import main
+from deixis_cli.newcomer import SupervisedNewcomer
 from deixis_cli.standby_exam import ENOUGH_FRAMES, StandbyExam
 from deixis_cli.swap_count import SwapCount
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import FrameId, HeadPoses
+from deixis_schemas.messages import FrameId, HeadPoses, Voice
 
 LABEL = codec.encoding_of(HeadPoses)
 
@@ -112,3 +115,16 @@ def test_a_stage_that_cannot_be_swapped_is_refused_with_the_reason(stage, why, c
 def test_settings_are_for_a_stage_that_is_started_anew(capsys):
     assert main(["swap", "headpose", "--robot", "r1", "--set", "method=affine", "--instance", "x"]) == 1
     assert "a command or instance has its own settings" in capsys.readouterr().err
+
+
+def test_a_newcomer_that_is_heard_has_not_ended_though_its_supervisor_knows_no_newcomer_any_more(monkeypatch):
+    started = Voice(stage="supervisor", instance="s", stamp_ns=1, state="speaks", other="new")
+    replies = [([("key", started)], []), *[([], [Refusal("key", "there is no newcomer of headpose")])] * 3]
+    monkeypatch.setattr(newcomers, "get_all", lambda *_, **__: replies.pop(0))
+    newcomer = SupervisedNewcomer(None, "r1", "headpose", (), "old")
+    assert newcomer.instance == "new"
+    assert newcomer.ended() == "there is no newcomer of headpose"
+    newcomer.keep(lambda: {"new"})
+    assert newcomer.ended() == ""
+    newcomer.keep(set)
+    assert newcomer.ended() == "there is no newcomer of headpose"
