@@ -1,11 +1,12 @@
 """Line-ups beside each other: accuracy, processor time and memory of our stages and of the guests in their place.
 
-usage: python bench/lineups.py [--lineups NAMES] [--clips DIR] [--only-clips GLOB] [--grey GLOB] [--signers DIR]
-       [--only-signers GLOB] [--json FILE]
+usage: python bench/lineups.py [--lineups NAMES] [--clips DIR] [--only-clips GLOB] [--grey GLOB] [--panned GLOB] [--pan-px N]
+       [--signers DIR] [--only-signers GLOB] [--json FILE]
 
 Each line-up plays, through the whole system in lockstep (`deixis eval --lineup NAME` does the same with clips):
 * labelled clips: POIs named, faces and hands found, yaw errors, false episodes;
 * --grey: those of them that fit the pattern once more without colour;
+* --panned: those that fit it once more from a robot that turns, by --pan-px pixels a frame, and tells fusion so;
 * people who sign and never point (../shared/data/asl_clips, where it is there): frames with a face and with a yaw, hands a
   frame, and episodes a minute, each of them false.
 cpu_ms: processor time a frame of tracker, headpose and gesture, without what they take to start; pss_mb: what the three held at
@@ -19,12 +20,11 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
+from changed_clips import greyed, panned
 from deixis_cli.options import quoted
 from deixis_cli.play import play
 from deixis_evaluation.clip_score import ClipScore
@@ -85,17 +85,12 @@ class Signers:
         }
 
 
-def measure(lineup: str, clips: Sequence[Clip], grey: Sequence[Clip], signers: Sequence[Path]) -> Figures:
-    """All figures of a line-up. Raises LineupError."""
+def measure(lineup: str, clips: Sequence[Clip], changed: Mapping[str, Sequence[Clip]], signers: Sequence[Path]) -> Figures:
+    """All figures of a line-up. changed: clips as another camera takes them, by what is changed. Raises LineupError."""
     guests, meter = guests_of(lineup), Meter()
     figures = _clip_figures(score(clips, guests, meter))
-    if grey:
-        summary = summarise(score(grey, guests, Meter()))
-        figures |= {
-            "grey_named": summary.clips_named / summary.pointing_clips if summary.pointing_clips else None,
-            "grey_faces": summary.blobs.faces.share,
-            "grey_raised_hands": summary.blobs.raised_hands.share,
-        }
+    for name, others in changed.items():
+        figures |= _changed_figures(name, score(others, guests, Meter())) if others else {}
     said = sign(signers, guests, meter)
     figures |= said.figures()
     figures["not_played"] = (figures["not_played"] or 0.0) + said.failed
@@ -139,21 +134,16 @@ def sign(clips: Sequence[Path], guests: dict[str, str], meter: Meter) -> Signers
     return counts
 
 
-@contextmanager
-def greyed(clips: Sequence[Clip]) -> Iterator[list[Clip]]:
-    """The clips without colour, for as long as they are needed."""
-    with tempfile.TemporaryDirectory(prefix="deixis-lineups-") as folder:
-        yield [_greyed(clip, Path(folder)) for clip in clips]
-
-
-def _greyed(clip: Clip, folder: Path) -> Clip:
-    meta, path = clip.truth.meta, folder / f"{clip.name}.mp4"
-    read = cv2.VideoCapture(str(clip.video))
-    written = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), meta.fps, (meta.width, meta.height))
-    while (frame := read.read())[0]:
-        written.write(cv2.cvtColor(cv2.cvtColor(frame[1], cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR))
-    written.release()
-    return replace(clip, name=f"{clip.name}_grey", video=path)
+def _changed_figures(name: str, scores: list[ClipScore]) -> Figures:
+    summary = summarise(scores)
+    return {
+        f"{name}_pointing": float(summary.pointing_clips),
+        f"{name}_named": float(summary.clips_named),
+        f"{name}_false_episodes": float(summary.false_quiet + summary.false_pointing),
+        f"{name}_faces": summary.blobs.faces.share,
+        f"{name}_raised_hands": summary.blobs.raised_hands.share,
+        f"{name}_false_hands_a_frame": summary.blobs.false_hands_per_frame,
+    }
 
 
 def _clip_figures(scores: list[ClipScore]) -> Figures:
@@ -203,6 +193,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--clips", type=Path, default=CLIPS, metavar="DIR", help="labelled clips (default: those that ship)")
     parser.add_argument("--only-clips", default="*", metavar="GLOB", help="only clips whose name fits")
     parser.add_argument("--grey", default="pointing", metavar="GLOB", help="clips to play without colour, too ('' for none)")
+    parser.add_argument("--panned", default="pointing", metavar="GLOB", help="clips to play panned, too ('' for none)")
+    parser.add_argument("--pan-px", type=int, default=2, metavar="N", help="pixels a frame (default: %(default)s)")
     parser.add_argument("--signers", type=Path, default=SIGNERS, metavar="DIR", help="people who sign (default: %(default)s)")
     parser.add_argument("--only-signers", default="*", metavar="GLOB", help="only those whose name fits")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write machine and figures to this file")
@@ -214,11 +206,11 @@ def main(argv: list[str] | None = None) -> int:
         said.print(f"signers: left out, for there are none in '{given.signers}'", style="yellow", markup=False, soft_wrap=True)
     try:
         clips = load_clips(given.clips, given.only_clips)
-        chosen = load_clips(given.clips, given.grey) if given.grey else []
-        with greyed(chosen) as grey:
+        to_grey, to_pan = (load_clips(given.clips, glob) if glob else [] for glob in (given.grey, given.panned))
+        with greyed(to_grey) as grey, panned(to_pan, given.pan_px) as pan:
             for name in given.lineups.split(","):
                 said.print(f"{name} ...", markup=False)
-                measured[name] = measure(name, clips, grey, signers)
+                measured[name] = measure(name, clips, {"grey": grey, "panned": pan}, signers)
                 _write(given.json, measured)
     except (ClipError, LineupError, Interrupted) as error:
         print(f"bench/lineups: {error}", file=sys.stderr)

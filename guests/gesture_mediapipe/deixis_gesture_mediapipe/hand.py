@@ -40,10 +40,10 @@ class Hand:
         beside = abs(x) >= self._config.beside_body
         return y <= (self._config.raised_beside_below_face if beside else self._config.raised_below_face)
 
-    def follow(self, place: Place, room: Place, now_s: float) -> None:
-        """The hand is seen there now; `room`: how far the room has moved in the picture, for the camera moves."""
+    def follow(self, place: Place, now_s: float) -> None:
+        """The hand is seen there now. It is still if it is beside its own face, whatever the camera does."""
         self.place, self.seen_s = place, now_s
-        self._way.append((now_s, (place[0] - room[0], place[1] - room[1])))
+        self._way.append((now_s, place))
         while now_s - self._way[0][0] > self._config.speed_window_s and len(self._way) > 2:
             self._way.popleft()
         self._step(now_s)

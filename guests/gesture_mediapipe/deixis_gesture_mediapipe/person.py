@@ -32,7 +32,6 @@ class Person:
         self._centre: Point = (0.0, 0.0)
         self._width = 0.0
         self._face_s = -math.inf
-        self._room: Point = (0.0, 0.0)
         self._hands: dict[int, Hand] = {}
         self._sides: dict[int, Side] = {}
 
@@ -40,14 +39,13 @@ class Person:
         """The face has been missing for too long."""
         return now_s - self._face_s > self._config.forget_s
 
-    def see(self, tracks: Sequence[Track], room_went_px: Point, now_s: float, read_hand: ReadHand) -> None:
+    def see(self, tracks: Sequence[Track], now_s: float, read_hand: ReadHand) -> None:
         """The person's tracks of the next frame."""
         face = next((track for track in tracks if track.kind == "face" and track.bbox_px[2] >= LEAST_FACE_PX), None)
         if face is not None:
             self._see_face(face, now_s)
         if not self._width:
             return
-        self._room = self._room[0] + room_went_px[0] / self._width, self._room[1] + room_went_px[1] / self._width
         for track in tracks:
             if track.kind != "face" and track.observed:
                 self._see_hand(track, now_s, read_hand)
@@ -87,7 +85,7 @@ class Person:
             self._sides[track.track_id] = "left" if track.kind == "left_hand" else "right"
         x, y = track.centroid_px
         place = (x - self._centre[0]) / self._width, (y - self._centre[1]) / self._width
-        hand.follow(place, self._room, now_s)
+        hand.follow(place, now_s)
         hand.look(read_hand(track.track_id, (x, y), self._width) if hand.is_raised else None)
 
     def _tip(self, hand: Hand) -> Point | None:

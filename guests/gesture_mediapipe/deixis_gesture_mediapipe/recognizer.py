@@ -17,22 +17,19 @@ class GestureRecognizer:
         self._config = config
         self._clock = RunClock()
         self._persons: dict[int, Person] = {}
-        self._room_px = (0.0, 0.0)
 
     def update(self, seen: Tracks, lens: Lens, mount: CameraMount, read_hand: ReadHand) -> list[Gesture]:
         """Gestures of a frame taken through `lens`, in the order of `person_id`. Another run of the camera starts anew."""
         moment = self._clock.advance(seen.run, seen.stamp_ns)
         if moment.new_run:
-            self._persons, self._room_px = {}, seen.room_offset_px
-        went = seen.room_offset_px[0] - self._room_px[0], seen.room_offset_px[1] - self._room_px[1]
-        self._room_px = seen.room_offset_px
+            self._persons = {}
         now_s, of_person = moment.now_ns * 1e-9, _by_person(seen)
         for person_id, tracks in of_person.items():
             if person_id not in self._persons:
                 if not any(track.kind == "face" for track in tracks):
                     continue
                 self._persons[person_id] = Person(person_id, self._config)
-            self._persons[person_id].see(tracks, went, now_s, read_hand)
+            self._persons[person_id].see(tracks, now_s, read_hand)
         self._persons = {key: person for key, person in self._persons.items() if not person.is_gone(now_s)}
         size = seen.width, seen.height
         shown = sorted(self._persons.keys() & of_person.keys())

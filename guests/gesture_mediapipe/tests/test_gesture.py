@@ -95,13 +95,13 @@ class Player:
     def __init__(self, shown):
         self.recognizer, self.seq, self.shown, self.asked = GestureRecognizer(GestureConfig()), 0, shown, 0
 
-    def see(self, *place, run=1):
-        tracks = [track("face", *FACE)]
+    def see(self, *place, run=1, panned_px=0.0):
+        tracks = [track("face", FACE[0] + panned_px, FACE[1])]
         if place:
             x, y = (middle + WIDTH * value for middle, value in zip(FACE, place, strict=True))
-            tracks.append(track("left_hand", x, y, track_id=1))
+            tracks.append(track("left_hand", x + panned_px, y, track_id=1))
         seen = Tracks(run=run, seq=self.seq, stamp_ns=10**18 + self.seq * 33_333_333, stage="tracker", instance="t",
-                      width=640, height=480, tracks=tracks)  # fmt: skip
+                      width=640, height=480, tracks=tracks, room_offset_px=(panned_px, 0.0))  # fmt: skip
         self.seq += 1
         return self.recognizer.update(seen, LENS, LEVEL, self._read)
 
@@ -149,6 +149,13 @@ def test_without_pictures_no_finger_is_claimed():
     said = Player(lambda _: None).play(*RAISE, *HELD)
     assert {gesture.gesture for gesture in said} <= {"none", "invisible"}
     assert said[-1].fingertips_px == []
+
+
+def test_a_hand_held_still_is_still_also_while_the_camera_turns():
+    player = Player(pointing)
+    player.play(*RAISE)
+    said = [player.see(*RAISE[-1], panned_px=4.0 * n)[0] for n in range(25)]
+    assert (said[-1].phase, said[-1].gesture) == ("stroke", "point_left")
 
 
 def test_a_wave_is_never_still():

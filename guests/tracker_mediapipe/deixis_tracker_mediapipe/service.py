@@ -35,7 +35,8 @@ def serve(node: Node, config: TrackerConfig) -> None:
             if left_out := tracker.persons.left_out:
                 node.count("persons_left_out", left_out)
                 node.warn("persons", f"more people are seen than max_persons: {config.max_persons} are followed")
-            out.put(Tracks.derive(frame, node.producer, tracks=tracks, width=frame.width, height=frame.height))
+            said = {"width": frame.width, "height": frame.height, "room_offset_px": tracker.room.offset_px}
+            out.put(Tracks.derive(frame, node.producer, tracks=tracks, **said))
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -10,6 +10,7 @@ from .config import TrackerConfig
 from .finders import FaceFinder, HandFinder, rgb_of
 from .messages import tracks_of
 from .persons import Persons
+from .room import Room
 from .seen import HandSeen, Picture
 
 LEAST_SIDE_PX = 32
@@ -20,7 +21,7 @@ class FrameRefused(ValueError):
 
 
 class Tracker:
-    """Finds faces in the whole picture, and about each person's face the hands."""
+    """Finds faces in the whole picture, about each person's face the hands, and how the room moves behind them."""
 
     def __init__(self, config: TrackerConfig) -> None:
         self._config = config
@@ -31,6 +32,7 @@ class Tracker:
         self._free = [HandFinder(config)]
         self._hands: dict[int, HandFinder] = {}
         self.persons = Persons(config)
+        self.room = Room()
 
     def update(self, image: Picture, run: int, stamp_ns: int) -> list[Track]:
         """Track one frame: (H, W, 3) uint8 BGR, of that run of the camera, captured at `stamp_ns`; tracks in its pixels.
@@ -46,9 +48,11 @@ class Tracker:
         if moment.new_run or self._shape != (height, width):
             self._shape = height, width
             self.persons.forget()
+            self.room.forget()
         rgb = rgb_of(image)
         self.persons.see_faces(self._faces.find(rgb), moment.now_ns * 1e-9)
         self.persons.see_hands(self._find_hands(rgb))
+        self.room.see(rgb, [(person.centre, person.width) for person in self.persons.shown])
         return [track for person in self.persons.shown for track in tracks_of(person)]
 
     def _find_hands(self, rgb: Picture) -> list[HandSeen]:
