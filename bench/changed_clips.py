@@ -67,11 +67,13 @@ def _turned(old: Clip, new: Clip, speed_px: int) -> Any:
     """The labels of a clip whose frames are shifted: places move, and the camera is turned by as much."""
     label = json.loads(old.video.with_suffix(".json").read_text(encoding="utf-8"))
     camera = label["meta"]["camera"]
+    still = np.array(camera["R_world_to_cam"]).reshape(3, 3)
     for number, frame in enumerate(label["frames"]):
         dx = offset_at(number, speed_px)
-        turn = _about_down(math.atan2(dx, camera["K"][0][0]))
+        # A robot turns about the vertical, the world's y, and not about an axis of its tilted camera.
+        turn = still @ _about_up(-math.atan2(dx, camera["K"][0][0])) @ still.T
         frame["camera"] = {
-            "R_world_to_cam": (turn @ np.array(camera["R_world_to_cam"]).reshape(3, 3)).ravel().tolist(),
+            "R_world_to_cam": (turn @ still).ravel().tolist(),
             "t_world_to_cam": (turn @ np.array(camera["t_world_to_cam"])).tolist(),
         }
         for person in frame["persons"]:
@@ -86,8 +88,8 @@ def _turned(old: Clip, new: Clip, speed_px: int) -> Any:
     return load_truth(path)
 
 
-def _about_down(angle: float) -> NDArray[np.float64]:
-    """Turns what lies ahead to the right (x right, y down, z ahead): a camera that was turned to the left sees it so."""
+def _about_up(angle: float) -> NDArray[np.float64]:
+    """A rotation of the world (x right, y up)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     return np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
 
