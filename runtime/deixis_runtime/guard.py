@@ -1,33 +1,38 @@
 """Guards one process of a container: `python -m deixis_runtime.guard COMMAND...` as its first process.
 
-A container engine starts again what ended, but not what hangs. So this one hears from the command that its loop runs (as
-systemd does: see `manager`), kills it where it falls silent, and ends as it ended; the engine's restart policy does the rest.
+A container engine starts again what ended, but not what hangs, and takes its time for it. So this one hears from the command
+that its loop runs (as systemd does: see `manager`), kills it where it falls silent though it could run (`hang_watch`), and
+starts again itself what was killed, by whomever. What ends by itself is the engine's: then it ends as that ended.
 It loads nothing but the standard library, for there is one in each container.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import signal
-import socket
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 
+from .hang_watch import HangWatch
 from .interrupts import Interrupts
-from .watchdog import Patience, Watchdog
+from .notifications import Notifications
+from .restarts import Restarts
+from .watchdog import Patience
 
-TURN_S = 0.1
+TURN_S = 0.05
 STOP_TIMEOUT_S = 4.0
-DATAGRAM_BYTES = 4096
 NAME = "the command"
+
+Command = subprocess.Popen[bytes]
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a command until it ends, and kill it where it hangs. The exit status is the command's."""
+    """Run a command until it ends by itself or is killed too often; kill it where it hangs. Its exit status is ours."""
     parser = argparse.ArgumentParser(prog="python -m deixis_runtime.guard", description=main.__doc__)
-    parser.add_argument("--silent-s", type=float, default=2.0, metavar="S", help="silence borne (default: %(default)s)")
+    silent_s = Patience().silent_s
+    parser.add_argument("--silent-s", type=float, default=silent_s, metavar="S", help="silence borne (default: %(default)s)")
     parser.add_argument("--ready-s", type=float, default=60.0, metavar="S", help="borne at its start (default: %(default)s)")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="COMMAND...")
     given = parser.parse_args(argv)
@@ -35,29 +40,43 @@ def main(argv: list[str] | None = None) -> int:
     if not command:
         parser.error("a command is needed")
     patience = Patience(ready_s=given.ready_s, silent_s=given.silent_s)
-    with Interrupts() as interrupts, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
-        heard.bind("")  # a free abstract name: nothing is left of it in the file system
-        heard.settimeout(TURN_S)
-        name = "@" + heard.getsockname()[1:].decode("ascii")
-        told = {"NOTIFY_SOCKET": name, "WATCHDOG_USEC": str(round(given.silent_s * 1e6))}
-        child = subprocess.Popen(command, env={**os.environ, **told})
-        return _guard(child, heard, interrupts, Watchdog(patience))
+    with Interrupts() as interrupts, Notifications(None, given.silent_s) as heard:
+        return _keep(command, heard.environment(), HangWatch(heard, patience), interrupts)
 
 
-def _guard(child: subprocess.Popen[bytes], heard: socket.socket, interrupts: Interrupts, watchdog: Watchdog) -> int:
-    while child.poll() is None:
+def _keep(command: list[str], environment: Mapping[str, str], watch: HangWatch, interrupts: Interrupts) -> int:
+    """Run the command, again and again while it is killed; its exit status."""
+    restarts = Restarts()
+    while True:
+        child = subprocess.Popen(command, env=environment)
+        why = _watch(child, watch, interrupts)
         if interrupts.requested():
             return _stop(child)
-        if _hears(heard):
-            watchdog.beat(child.pid)
-        for why in watchdog.hanging({NAME: child.pid}, time.monotonic()).values():
+        if child.returncode >= 0:
+            return exit_status(child.returncode)
+        why = why or f"killed by signal {-child.returncode}"
+        verdict = restarts.after(why, time.monotonic())
+        if verdict.given_up:
+            _say(f"{NAME} is given up: {verdict.given_up}")
+            return exit_status(child.returncode)
+        _say(f"{NAME} ended ({why}); starting it again")
+        if interrupts.wait(verdict.pause_s):
+            return exit_status(child.returncode)
+
+
+def _watch(child: Command, watch: HangWatch, interrupts: Interrupts) -> str:
+    """Watch it until it ends or we are to; why it was killed, if we did that."""
+    while child.poll() is None and not interrupts.wait(TURN_S):
+        watch.hear()
+        for why in watch.hanging({NAME: child.pid}, time.monotonic()).values():
             _say(f"{NAME} {why}; killing it")
             child.kill()
             child.wait()
-    return exit_status(child.returncode)
+            return why
+    return ""
 
 
-def _stop(child: subprocess.Popen[bytes]) -> int:
+def _stop(child: Command) -> int:
     """End the command as we are ended; a stopped one sees SIGTERM after SIGCONT only."""
     child.terminate()
     child.send_signal(signal.SIGCONT)
@@ -68,13 +87,6 @@ def _stop(child: subprocess.Popen[bytes]) -> int:
         child.kill()
         child.wait()
     return exit_status(child.returncode)
-
-
-def _hears(heard: socket.socket) -> bool:
-    try:
-        return b"WATCHDOG=1" in heard.recv(DATAGRAM_BYTES).split(b"\n")
-    except TimeoutError:
-        return False
 
 
 def _say(text: str) -> None:

@@ -18,10 +18,19 @@ class HangWatch:
         self._looks: dict[int, Look] = {}
         self._looked_s = 0.0
 
-    def hanging(self, running: Mapping[str, int], now_s: float) -> dict[str, str]:
-        """Those of the `running` processes (pid by name) that hang, with the reason; now_s: monotonic."""
-        for pid in self._notifications.senders():
+    def hear(self) -> set[int]:
+        """Take note of the signs that came; process numbers of those who gave them."""
+        senders = self._notifications.senders()
+        for pid in senders:
             self._watchdog.beat(pid)
+        return senders
+
+    def take_leaving(self) -> set[int]:
+        """Those who have said since the last call that they end."""
+        return self._notifications.take_leaving()
+
+    def hanging(self, running: Mapping[str, int], now_s: float) -> dict[str, str]:
+        """Those of the `running` processes (pid by name) that hang, with the reason; now_s: monotonic. Hear them before."""
         looks = {pid: look for pid in self._watchdog.suspects() if (look := look_at(pid)) is not None}
         between_s = now_s - self._looked_s
         unable = {pid: unable_s(self._looks[pid], look, between_s) for pid, look in looks.items() if pid in self._looks}

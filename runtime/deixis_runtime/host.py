@@ -165,6 +165,7 @@ class Host:
         """Watch the children; call it several times a second. Raises HostFailed when the router or all stages are given up."""
         self.supervisor.poll()
         now_s = time.monotonic()
+        self._watch.hear()
         for name, why in self._watch.hanging(self.supervisor.running(), now_s).items():
             self._note_held()
             self.supervisor.kill(name, why)

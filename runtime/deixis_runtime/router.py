@@ -19,7 +19,7 @@ from .interrupts import Interrupts
 from .limit import RateLimit
 from .link_security import LinkSecurity, SecurityError, cautions, endpoints, secure
 from .link_watch import LinkWatch
-from .manager import Manager
+from .manager import Manager, Unheard
 from .memory import settle
 from .parent import Parent
 from .session import Unreachable, base_config, close, exit_now, first_line, put_settings
@@ -135,14 +135,15 @@ def _watch_links(
                 log.log(level, "%s", text)
         _tell_manager(manager, limit, "linked" if linked else "no link to another router")
         interrupts.wait(TURN_S)
+    manager.leave()
 
 
 def _tell_manager(manager: Manager, limit: RateLimit, status: str) -> None:
     try:
         manager.tell(time.monotonic(), status)
-    except OSError as error:
+    except Unheard as error:
         if limit.allow("manager", time.monotonic()) is not None:
-            log.warning("NOTIFY_SOCKET: nobody hears that the router is alive: %s", error.strerror)
+            log.warning("%s", error)
 
 
 def _endpoints(value: object) -> list[str]:

@@ -26,7 +26,7 @@ from .inputs import Subscription
 from .limit import RateLimit
 from .link_watch import CertificateWatch, say
 from .liveliness import AliveStages
-from .manager import Manager
+from .manager import Manager, Unheard
 from .memory import settle
 from .outputs import Publisher, oversize
 from .parent import Parent
@@ -284,6 +284,8 @@ class Node:
             self.log.error("the supervisor is gone; stopping")
             remove_socket_folder(self._endpoint)
             self.stop()
+        if self.stopping:
+            self._manager.leave()
         return not self.stopping
 
     def _tell_manager(self) -> None:
@@ -291,8 +293,8 @@ class Node:
         status = f"{heartbeat.state}: {heartbeat.reason}" if heartbeat.reason else heartbeat.state
         try:
             self._manager.tell(time.monotonic(), status)
-        except OSError as error:
-            self.warn("manager", f"NOTIFY_SOCKET: nobody hears that this stage is alive: {error.strerror}")
+        except Unheard as error:
+            self.warn("manager", str(error))
 
     def _answer_health(self, _query: Query) -> list[tuple[str, Message]]:
         return [(self._health.key, self._record())]

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import time
+from contextlib import contextmanager
 
 import pytest
 from running import CLIP, POINTED_AT, ROOT, SITE, wait_until
@@ -14,11 +15,13 @@ WHY_NOT = missing_for_systemd_host()
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)]
 
 STAGES = ("camera", "tracker", "headpose", "gesture", "fusion")
-UNITS = ("deixis-router.service", *(f"deixis@{stage}.service" for stage in STAGES))
+WATCHMAN = "deixis-watchman.service"
+UNITS = ("deixis-router.service", WATCHMAN, *(f"deixis@{stage}.service" for stage in STAGES))
 TARGETS = ("deixis-robot.target", "deixis-edge.target")
 SOCKET = "unixsock-stream//run/deixis/router.sock"
 PATIENCE_S = 60.0
-AGAIN_S = 5.0  # 2 s of silence and 0.2 s of a pause, and the rest for a busy machine
+AGAIN_S = 2.0
+IMPORTS_S = 0.7
 ROBOT = "r1"
 GUARDED = "tls/127.0.0.1:7448"
 ONE_MACHINE = "--config /etc/deixis/one_machine.json5 --listen tcp/127.0.0.1:7447"
@@ -128,26 +131,66 @@ def test_another_host_comes_by_mutual_tls(host):
 
 def test_memory_is_limited(host):
     limits = {unit: int(host.show(unit, "MemoryMax")) // 2**20 for unit in UNITS}
-    assert limits == {unit: 256 if unit == "deixis-router.service" else 512 for unit in UNITS}
+    assert limits == {unit: {"deixis-router.service": 256, WATCHMAN: 64}.get(unit, 512) for unit in UNITS}
 
 
 def test_a_killed_stage_and_a_stopped_one_are_started_again_and_the_poi_is_named_again(host):
     tracker, headpose = "deixis@tracker.service", "deixis@headpose.service"
     before = {unit: (main_pid(host, unit), restarts(host, unit)) for unit in UNITS}
-    at_s = time.monotonic()
     send(host, "KILL", tracker)
     send(host, "STOP", headpose)
     for unit in (tracker, headpose):
         old = before[unit][0]
         wait_until(lambda unit=unit, old=old: main_pid(host, unit) not in (0, old), f"{unit} is again", PATIENCE_S, host.log)
-        assert started_s(host, unit) - at_s < AGAIN_S, unit
     assert {unit for unit in UNITS if restarts(host, unit) > before[unit][1]} == {tracker, headpose}
     wait_for_an_answer(host)
 
 
-def started_s(host, unit):
-    """When the unit's process was started, on the monotonic clock that all namespaces share."""
-    return int(host.show(unit, "ExecMainStartTimestampMonotonic")) / 1e6
+@pytest.mark.parametrize("signal", ["KILL", "STOP"])
+@pytest.mark.parametrize("stage", ["headpose", "tracker"])
+def test_a_dead_and_a_hung_stage_are_heard_again_within_two_seconds(host, stage, signal):
+    """Of three times the quickest counts. Where other work makes imports slow, it has so much more."""
+    unit, times = f"deixis@{stage}.service", []
+    host.run(["systemctl", "reset-failed", unit])  # its starts are counted, and these are no fault
+    more_s = max(0.0, imports_s(host, stage) - IMPORTS_S)
+    with first_words(host, stage) as heard:
+        while not times or (min(times)[0] >= AGAIN_S + more_s and len(times) < 3):
+            times.append(heard_again(host, unit, signal, heard))
+    print(f"{stage}, {signal}: heard again, started again after {times}; {more_s:.2f} s more for other work")
+    assert min(times)[0] < AGAIN_S + more_s, host.log.read_text()[-3000:]
+
+
+def imports_s(host, stage):
+    """How long a start of that stage takes this machine now, as far as it is imports."""
+    began_s = time.monotonic()
+    host.run(["/opt/deixis/bin/python", "-c", f"import deixis_{stage}.service"])
+    return time.monotonic() - began_s
+
+
+@contextmanager
+def first_words(host, stage):
+    """Lines of `first_words.py` about a stage that is heard already."""
+    argv = ["/opt/deixis/bin/python", f"{CHECKOUT}/tests/first_words.py", ROBOT, stage, SOCKET]
+    with host.popen(argv, stdout=subprocess.PIPE, text=True) as listener:
+        try:
+            lines = (line.split() for line in listener.stdout)
+            assert next(lines)[0] == "listening"
+            next(lines)
+            yield lines
+        finally:
+            host.run(["pkill", "-f", "first_words.py"])
+            listener.stdout.close()
+            listener.wait(10)
+
+
+def heard_again(host, unit, signal, heard):
+    """Seconds from the signal to the first message of the new process, and to its start."""
+    at_s = time.monotonic()
+    send(host, signal, unit)
+    _, heard_s = next(heard)
+    # The monotonic clock is the same in all namespaces.
+    started_s = int(host.show(unit, "ExecMainStartTimestampMonotonic")) / 1e6
+    return round(float(heard_s) - at_s, 2), round(started_s - at_s, 2)
 
 
 def wait_for_an_answer(host):
@@ -168,7 +211,7 @@ def is_right(line):
 
 def test_live_stages_share_memory(host):
     host.run(["sed", "-i", "s/ --lockstep//", "/etc/deixis/deixis.env"])
-    host.run(["systemctl", "restart", *UNITS[1:]])
+    host.run(["systemctl", "restart", *UNITS[2:]])
     tracker, headpose = "deixis@tracker.service", "deixis@headpose.service"
     common = wait_until(
         lambda: shared_segments(host, tracker) & shared_segments(host, headpose), "frames", PATIENCE_S, host.log

@@ -1,22 +1,13 @@
-"""The first process of a container: it ends what hangs, and ends with it."""
+"""The first process of a container: it ends what hangs, starts again what was killed, and ends with what ended."""
 
+import os
 import signal
 import subprocess
 import sys
 import time
 
 import pytest
-
-# As a stage does: alive several times a second.
-BEATS = """
-import os, time
-from deixis_runtime.manager import Manager
-manager = Manager(os.environ)
-print("up", os.getpid(), flush=True)
-while True:
-    manager.tell(time.monotonic())
-    time.sleep(0.05)
-"""
+from beating import BEATS, WAITS
 
 
 @pytest.fixture
@@ -32,24 +23,35 @@ def guarded():
 
     yield start
     for guard in started:
-        guard.kill()
-        guard.communicate()
+        guard.terminate()
+        guard.communicate(timeout=20)
 
 
-def test_a_process_that_is_stopped_is_killed_and_the_status_says_so(guarded):
-    guard, pid = guarded(BEATS, "--silent-s", "1")
+@pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_process_that_hangs_or_is_killed_is_there_again_within_two_seconds(guarded, number):
+    guard, pid = guarded(BEATS)
     with pytest.raises(subprocess.TimeoutExpired):  # alive for longer than silence is borne
         guard.wait(2)
-    subprocess.run(["kill", "-STOP", str(pid)], check=True)
+    os.kill(pid, number)
     began = time.monotonic()
-    assert guard.wait(20) == 128 + signal.SIGKILL
-    assert time.monotonic() - began > 0.5
-    assert "gave no sign that its loop runs for 1 s; killing it" in guard.stderr.read()
+    word, again = guard.stdout.readline().split()
+    assert time.monotonic() - began < 2.0
+    assert word == "up"
+    assert int(again) != pid
 
 
-def test_a_process_that_never_says_that_it_is_ready_is_killed(guarded):
-    guard, _ = guarded("import time; print('up 0', flush=True); time.sleep(60)", "--ready-s", "0.5")
-    assert guard.wait(20) == 128 + signal.SIGKILL
+def test_what_hangs_again_and_again_is_given_up_and_the_reason_said(guarded):
+    guard, _ = guarded("print('up 0', flush=True); import time; time.sleep(60)", "--ready-s", "0.2")
+    assert guard.wait(40) == 128 + signal.SIGKILL
+    said = guard.stderr.read()
+    assert "gave no sign that its loop runs within 0.2 s; killing it" in said
+    assert "is given up: it ended 6 times within 60 s" in said
+
+
+def test_a_process_that_could_not_run_is_left_in_peace(guarded):
+    """It is silent for more than twice what is borne, through no fault of its own."""
+    guard, pid = guarded(WAITS)
+    assert guard.stdout.readline() == f"back {pid}\n"
 
 
 def test_sigterm_reaches_the_process_even_a_stopped_one(guarded):

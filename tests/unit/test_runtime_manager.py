@@ -3,7 +3,7 @@
 import socket
 
 import pytest
-from deixis_runtime.manager import Manager, message
+from deixis_runtime.manager import Manager, Unheard, message
 
 
 @pytest.fixture
@@ -57,8 +57,36 @@ def test_an_abstract_name_is_reached():
 
 
 def test_a_manager_that_is_gone_is_an_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(Unheard, match=r"NOTIFY_SOCKET: nobody hears .*: No such file"):
         Manager({"NOTIFY_SOCKET": str(tmp_path / "none")}).tell(0.0)
+
+
+def test_the_watchman_is_told_five_times_a_second_however_patient_the_manager_is(heard):
+    manager = Manager({"DEIXIS_WATCHMAN": heard.getsockname(), "WATCHDOG_USEC": "10000000"})
+    for turn in range(11):
+        manager.tell(20.0 + turn / 10)
+    assert len(all_of(heard)) == 6
+
+
+def test_a_watchman_that_is_gone_keeps_no_sign_from_the_manager_and_is_said(heard, tmp_path):
+    manager = Manager(environment(heard, DEIXIS_WATCHMAN=str(tmp_path / "none"), WATCHDOG_USEC="2000000"))
+    for now_s in (0.0, 1.0):
+        with pytest.raises(Unheard, match=r"^DEIXIS_WATCHMAN: nobody hears"):
+            manager.tell(now_s)
+    assert len(all_of(heard)) == 2
+
+
+def test_who_leaves_tells_the_watchman_and_then_nobody(heard):
+    manager = Manager({"DEIXIS_WATCHMAN": heard.getsockname()})
+    manager.leave()
+    manager.leave()
+    manager.tell(0.0)
+    assert all_of(heard) == [["STOPPING=1"]]
+
+
+def test_who_leaves_says_nothing_to_systemd_which_knows(heard):
+    Manager(environment(heard)).leave()
+    assert all_of(heard) == []
 
 
 def test_without_a_manager_nothing_happens():
