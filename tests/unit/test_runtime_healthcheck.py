@@ -1,6 +1,10 @@
 """What the container's health check finds wrong."""
 
+import os
 import socket
+import subprocess
+import time
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -10,6 +14,7 @@ from deixis_schemas import codec
 from deixis_schemas.messages import Health
 from deixis_schemas.samples import SAMPLES
 
+CONFIG = Path(__file__).parents[2] / "config"
 HEALTH = next(message for message in SAMPLES if isinstance(message, Health))
 
 
@@ -58,3 +63,38 @@ def test_the_robot_has_to_be_known(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main(["tracker"])
     assert "DEIXIS_ROBOT" in capsys.readouterr().err
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch):
+    """Runs the container's script, with a Python that notes that it was asked and answers by its file `status`."""
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\nexit $(cat {tmp_path}/status)\n')
+    python.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+
+    def run(status):
+        (tmp_path / "status").write_text(str(status))
+        return subprocess.run(["sh", CONFIG / "healthcheck.sh", "tracker"], check=False, timeout=20).returncode
+
+    return run
+
+
+def asked(folder):
+    return (folder / "asked").read_text().splitlines()
+
+
+def test_a_container_that_answered_is_not_asked_again_for_half_a_minute(check, tmp_path):
+    assert check(0) == 0
+    assert check(1) == 0
+    assert asked(tmp_path) == ["-m deixis_runtime.healthcheck tracker"]
+    long_ago = time.time() - 31
+    os.utime(tmp_path / "answered", (long_ago, long_ago))
+    assert check(1) == 1
+    assert len(asked(tmp_path)) == 2
+
+
+def test_a_container_that_did_not_answer_is_asked_each_time(check, tmp_path):
+    assert [check(1), check(1), check(0)] == [1, 1, 0]
+    assert len(asked(tmp_path)) == 3
