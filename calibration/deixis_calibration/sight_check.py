@@ -98,6 +98,7 @@ def read(text: str, interrupts: Interrupts, on_part: OnPart) -> Iterator[Shot]:
 
 def heard(asked: CameraLook, interrupts: Interrupts, on_part: OnPart) -> Iterator[Shot]:
     """Frames of a running system, each with its tracks: it waits for these for a turn or two. Raises Unreachable."""
+    assert asked.robot is not None, "without a source a robot is named"
     with open_client(asked.connect, shared_memory=False) as session:
         inbox = Inbox()
         keys = topics.FRAME.key(asked.robot), topics.TRACKS.key(asked.robot)

@@ -40,11 +40,11 @@ MARKS = {"ok": ("ok   ", "green"), "note": ("note ", "yellow"), "wrong": ("WRONG
 def register(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser("doctor", help="what is wrong, and what to do", description=__doc__)
-    add_robot(parser)
+    add_robot(parser, required=False)
     add_connect(parser)
     add_json(parser, "print one JSON document")
     parser.add_argument("--source", metavar="SOURCE", help="also open this camera, file or stream here, and take a picture")
-    parser.add_argument("--local", action="store_true", help="look at this machine only, at no router")
+    parser.add_argument("--local", action="store_true", help="look at this machine only, at no router and no robot")
     parser.add_argument(
         "--camera",
         nargs="?",
@@ -58,6 +58,8 @@ def register(subparsers: Any) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Examine the system and this machine. 1 when something is wrong. Raises CommandError."""
+    if given.robot is None and not given.local:
+        raise CommandError("--robot NAME is needed to look at a running system; --local looks at this machine alone")
     looks = camera_looks(given)
     found = [] if given.local else examine(given.connect, given.robot)
     found += examine_machine(given.source)

@@ -34,7 +34,7 @@ class Room:
 def examine_machine(source: str | None) -> Iterator[Finding]:
     """All that is to be said of this machine. `source`: also open this camera, file or stream."""
     stages = installed_stages()
-    yield from versions(versions_of(*stages, "cli"))
+    yield from versions(versions_of(*(f"deixis-{name}" for name in (*stages, "cli"))))
     yield from shared_memory(SHARED_MEMORY, room(SHARED_MEMORY), len(stages) + 1)
     certificates = certificates_of()
     if certificates is not None:

@@ -26,10 +26,12 @@ class CommandError(Exception):
     """A command that cannot do its job; the text says why."""
 
 
-def add_robot(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+def add_robot(parser: argparse.ArgumentParser, default: str | None = None, *, required: bool = True) -> None:
     """--robot; required where there is no default: two robots must never cross-talk by accident."""
     shown = f"name of the robot, the second part of every key{f' (default: {default})' if default else ''}"
-    parser.add_argument("--robot", required=default is None, default=default, type=checked_name, metavar="NAME", help=shown)
+    parser.add_argument(
+        "--robot", required=required and default is None, default=default, type=checked_name, metavar="NAME", help=shown
+    )
 
 
 def add_connect(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ import zenoh
 from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
-from deixis_schemas import topics
+from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
 
 from .gets import TIMEOUT_S, get_healths, get_names, get_raw, get_state
@@ -115,7 +115,8 @@ class Playback:
         self._inbox = Inbox()
         self._end = PlayEnd(options.stages)
         self._counts: Counter[str] = Counter()
-        self._targets: deque[Target] = deque(maxlen=MAX_TARGETS)
+        # By episode, as sent: 3 kB each. As objects a thousand take ten times that, and a looped clip fills them in an hour.
+        self._targets: deque[tuple[str, bytes]] = deque(maxlen=MAX_TARGETS)
 
     def run(self, host: Host) -> None:
         """From the first process to the last answer. Raises HostFailed, Unreachable, zenoh.ZError, or for a file an OSError."""
@@ -145,7 +146,7 @@ class Playback:
         for key, why in self._inbox.rejections.items():
             log.warning("%s: not recorded: %s", key, why)
         result.frames = self._counts["Frame"]
-        result.targets = list(self._targets)
+        result.targets = [codec.decode(Target, sent, codec.encoding_of(Target)) for _, sent in self._targets]
         result.counters = dict(self._counts)
         result.camera = self._end.camera
         result.signal = self.interrupts.signal
@@ -192,7 +193,7 @@ class Playback:
         if isinstance(message, Health) and message.stage != topics.SUPERVISOR:
             self.result.health[message.stage] = message
         if isinstance(message, Target) and message.final:
-            self._targets.append(message)
+            self._targets.append((message.episode_id, codec.encode(message)))
         if self._on_message is not None:
             self._on_message(received.key, message)
 
@@ -222,7 +223,7 @@ class Playback:
         """Whether no episode is open and the final target of each has been heard."""
         if state is None or state.open_episodes:
             return False
-        return {target.episode_id for target in state.recent_targets} <= {target.episode_id for target in self._targets}
+        return {target.episode_id for target in state.recent_targets} <= {episode for episode, _ in self._targets}
 
 
 def _said(given_up: dict[str, str]) -> str:

@@ -112,7 +112,7 @@ def look(session: zenoh.Session, robot: str, cpu_over_s: float = 0.0) -> System:
     cameras, _ = get_all(session, topics.CAMERA_INFO.key(robot), CameraInfo)
     state = get_state(session, robot)
     camera = cameras[0][1] if cameras else None
-    return System(robot, processes, camera, state, refused, versions_of("cli"), supervisors)
+    return System(robot, processes, camera, state, refused, versions_of("deixis-cli"), supervisors)
 
 
 def alive_processes(session: zenoh.Session, robot: str) -> set[tuple[str, str]]:

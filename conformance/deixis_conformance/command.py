@@ -18,7 +18,10 @@ from typing import Any, NoReturn
 import zenoh
 from deixis_cli.mcap_file import McapFileError
 from deixis_cli.options import CommandError, add_json
-from deixis_runtime.certificates import add_certificates
+from deixis_runtime.access import FRAME_READERS
+from deixis_runtime.certificate_check import whose
+from deixis_runtime.certificates import add_certificates, certificates_of
+from deixis_runtime.endpoint import is_guarded
 from deixis_runtime.router import router_config
 from deixis_runtime.session import DEFAULT_ENDPOINT, close, first_line, open_client
 from deixis_runtime.settings import checked_name
@@ -82,6 +85,7 @@ def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
     with ExitStack() as stack:
         stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, _leave))
         if given.start is None:
+            refuse_unseen(given.stage, given.connect)
             session = stack.enter_context(open_client(given.connect, shared_memory=False))
             exam = Examination(session, given.robot, given.stage, recording, lambda: True)
             exam.listen(all_keys=False)
@@ -94,6 +98,16 @@ def _examine(given: argparse.Namespace, recording: Recording) -> list[Result]:
         exam.listen(all_keys=True)
         stack.enter_context(subject)
         return examine_started(exam, subject, recording)
+
+
+def refuse_unseen(stage: str, endpoint: str) -> None:
+    """Raises CommandError where our certificate is given nothing of what the stage publishes: pictures are private."""
+    member = whose(certificates_of()) if is_guarded(endpoint) else None
+    if stage == topics.FRAME.stage and member is not None and member.role not in FRAME_READERS:
+        raise CommandError(
+            f"the certificate of {member} is given no frames, so a {stage} cannot be checked by it: check it on the {stage}'s "
+            f"own host, with --connect to the socket of its router, or by the certificate of an edge"
+        )
 
 
 def _leave(number: int, _frame: FrameType | None) -> NoReturn:

@@ -20,6 +20,8 @@ ROUTERS: tuple[Role, ...] = ("robot", "edge")
 """Roles of hosts with a router that others link to, or that links to others: they need the list."""
 EDITORS: tuple[Role, ...] = ("edge", "editor")
 """Roles that may edit POIs; an edge passes on what editors ask of it."""
+FRAME_READERS: tuple[Role, ...] = ("edge",)
+"""Roles that are given frames, unless these stay with the robots."""
 
 # An X.509 common name holds 64 characters; the longest role and the colon take 7 of them.
 MEMBER_PATTERN = rf"^({'|'.join(ROLES)}):[A-Za-z0-9_][A-Za-z0-9_.\-]{{0,56}}$"

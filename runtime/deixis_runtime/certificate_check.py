@@ -99,13 +99,18 @@ def examine(certificates: Certificates, now_s: float) -> Finding:
 
 def who_may_not_edit(certificates: Certificates | None) -> Member | None:
     """Whose certificate this is, where access control means it not to edit POIs. Without one we are of the host itself."""
+    member = whose(certificates)
+    return member if member is not None and member.role not in EDITORS else None
+
+
+def whose(certificates: Certificates | None) -> Member | None:
+    """Whose certificate this is; None without one, or where it is no member's or cannot be read."""
     if certificates is None:
         return None
     try:
-        member = read(certificates).member
+        return read(certificates).member
     except CertificateError:
         return None  # said where the folder itself is examined
-    return member if member is not None and member.role not in EDITORS else None
 
 
 def _context(protocol: int, certificates: Certificates) -> ssl.SSLContext:

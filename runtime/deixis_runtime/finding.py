@@ -22,7 +22,7 @@ class CameraLook:
     """
 
     source: str | None
-    robot: str
+    robot: str | None
     connect: str
     picture: Path
 

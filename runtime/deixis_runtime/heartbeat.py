@@ -40,13 +40,14 @@ class StepTimes:
 class Heartbeat:
     """Collects what the health record says."""
 
-    def __init__(self, producer: Producer) -> None:
+    def __init__(self, producer: Producer, distribution: str) -> None:
+        """`distribution`: what the process is made by, whose version is said."""
         self.state: HealthState = "ok"
         self.reason = ""
         self.counters: dict[str, int] = {}
         self.notes: dict[str, str] = {}
         self._producer = producer
-        self._versions = versions_of(producer.stage)
+        self._versions = versions_of(distribution)
         self._count = 0
         self._started_s = time.monotonic()
         self._next_s = self._started_s

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from deixis_schemas.messages import CameraInfo
 
@@ -16,6 +16,7 @@ Point = tuple[float, float]
 Size = tuple[int, int]
 Row = tuple[float, float, float]
 Square = tuple[Row, Row, Row]
+DistortionModel = Literal["none", "plumb_bob", "rational_polynomial", "equidistant"]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 UNDISTORT_STEPS = 20

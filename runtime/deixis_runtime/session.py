@@ -89,15 +89,15 @@ def open_client(endpoint: str, *, shared_memory: bool = True) -> Iterator[zenoh.
 
 
 def _unreachable(endpoint: str, said: str) -> Unreachable:
-    """Zenoh says only that the time is over where a certificate is refused, or one side speaks TLS and the other does not."""
+    """Zenoh says only that the time is over where a certificate is refused, or what has the port is no such router."""
     # Here, for it needs `ssl`, and a session that opens does not.
-    from .unanswered import wants_tls, why_unanswered  # noqa: PLC0415
+    from .unanswered import who_listens, why_unanswered  # noqa: PLC0415
 
     try:
         read_endpoint(endpoint)
     except NotAnEndpoint as error:
         return Unreachable(str(error))
-    why = why_unanswered(endpoint, certificates_of()) if is_guarded(endpoint) else wants_tls(endpoint)
+    why = why_unanswered(endpoint, certificates_of()) if is_guarded(endpoint) else who_listens(endpoint)
     if why is None:
         advice = "start one with 'deixis run' or 'deixis up', or name another with --connect"
         return Unreachable(f"no Zenoh router answers at {endpoint} ({said}); {advice}")

@@ -36,6 +36,7 @@ from .readers import Readers
 from .session import Unreachable, exit_now, first_line, open_client
 from .settings import CommonOptions, ConfigError, StageConfig, load_config, parse_options
 from .socket_folder import remove_socket_folder
+from .versions import distribution_of
 
 C = TypeVar("C", bound=StageConfig)
 
@@ -55,8 +56,13 @@ MAX_COUNTERS = 60  # of the stage; health has room for ours besides
 class Node:
     """What a stage's `serve` function works with. One per process; not for use from other threads unless said."""
 
-    def __init__(self, session: zenoh.Session, stage: str, options: CommonOptions, *, is_stage: bool = True) -> None:
-        """`is_stage`: a robot has one process of this name, and it is said where there are more; its state is logged."""
+    def __init__(
+        self, session: zenoh.Session, stage: str, options: CommonOptions, *, is_stage: bool = True, distribution: str = ""
+    ) -> None:
+        """`is_stage`: a robot has one process of this name, and it is said where there are more; its state is logged.
+
+        `distribution`: what the process is made by, `deixis-STAGE` if nothing is said.
+        """
         self.producer = Producer(stage, options.instance)
         self.robot = options.robot
         self.site = options.site
@@ -73,7 +79,7 @@ class Node:
         self._limit = RateLimit()
         self._logged_state: HealthState = "ok"
         self._linked_to = ""
-        self._heartbeat = Heartbeat(self.producer)
+        self._heartbeat = Heartbeat(self.producer, distribution or f"deixis-{stage}")
         self._patient_puts = PatientPuts(self._go_on) if options.lockstep else None
         self._inputs: list[Subscription] = []
         self._outputs: list[Publisher] = []
@@ -452,7 +458,7 @@ def setup_logging() -> None:
 def _serve(session: zenoh.Session, stage: str, options: CommonOptions, config: C, serve: Callable[[Node, C], None]) -> bool:
     """Whether the stage has ended because another process has its place."""
     try:
-        node = Node(session, stage, options)
+        node = Node(session, stage, options, distribution=distribution_of(serve.__module__))
     except zenoh.ZError as error:
         raise Unreachable(f"the router at {options.connect} refused the stage: {first_line(error)}") from None
     for number in (signal.SIGTERM, signal.SIGINT):

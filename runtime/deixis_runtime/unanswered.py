@@ -46,15 +46,16 @@ def why_unanswered(text: str, certificates: Certificates | None) -> Finding:
         return _why_tls(text, endpoint, connection, certificates) if endpoint.protocol == "tls" else _why_plain(text, endpoint)
 
 
-def wants_tls(text: str) -> Finding | None:
-    """That what listens at a plain TCP endpoint speaks TLS; None where it does not, or nobody listens."""
+def who_listens(text: str) -> Finding | None:
+    """Who has the port of a plain TCP endpoint where no session is opened; None where nobody does, or that cannot be seen."""
     try:
         endpoint = read_endpoint(text)
-    except NotAnEndpoint:
-        return None
-    if endpoint.protocol != "tcp" or not _tls_is_spoken(endpoint):
-        return None
-    return Finding("wrong", f"what listens at {text} speaks TLS", SPEAKS_TLS)
+        if endpoint.protocol == "tcp":
+            socket.create_connection((endpoint.host, endpoint.port), WAIT_S).close()
+            return _why_plain(text, endpoint)
+    except (NotAnEndpoint, OSError):
+        pass  # then Zenoh's own words are all there is
+    return None
 
 
 def _why_socket(path: str) -> Finding:

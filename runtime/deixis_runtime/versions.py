@@ -7,10 +7,15 @@ from importlib.metadata import PackageNotFoundError, version
 SHARED = ("deixis-schemas", "deixis-runtime", "eclipse-zenoh")
 
 
-def versions_of(*stages: str) -> dict[str, str]:
-    """Versions by distribution: of what all stages share, and of the distributions of these stages as far as there are any."""
-    found = {name: installed(name) for name in (*SHARED, *(f"deixis-{stage}" for stage in stages))}
+def versions_of(*distributions: str) -> dict[str, str]:
+    """Versions by distribution: of what all stages share, and of these as far as they are installed."""
+    found = {name: installed(name) for name in (*SHARED, *distributions)}
     return {name: text for name, text in found.items() if text is not None}
+
+
+def distribution_of(module: str) -> str:
+    """The distribution that a module of ours or of a guest comes with: each has one package, named alike."""
+    return module.partition(".")[0].replace("_", "-")
 
 
 def installed(name: str) -> str | None:

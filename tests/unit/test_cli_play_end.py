@@ -1,9 +1,15 @@
-"""When a played source is done."""
+"""When a played source is done, and what is kept of one that never is."""
 
+import gc
+import sys
+
+from deixis_cli.inbox import Received
+from deixis_cli.play import MAX_TARGETS, Playback
 from deixis_cli.play_end import GRACE_S, PlayEnd
+from deixis_runtime.host import HostOptions
 from deixis_schemas import topics
-from deixis_schemas.messages import CameraInfo, Tracks
-from deixis_schemas.samples import FRAME
+from deixis_schemas.messages import CameraInfo, Target, Tracks
+from deixis_schemas.samples import FRAME, SAMPLES
 
 ALL = ("camera", "tracker", "headpose", "gesture", "fusion")
 
@@ -60,3 +66,24 @@ def test_a_retrying_camera_is_no_failure_and_a_failed_one_tells_its_reason():
     assert end.failure() is None
     end.hear(topics.CAMERA_INFO, camera("failed", reason="not a video"), 11.0)
     assert end.failure() == "not a video"
+
+
+def test_of_the_answers_to_a_source_without_an_end_a_thousand_are_kept_and_they_are_small():
+    """Kept as objects, they took 35 kB each: 30 MB an hour of a looped clip."""
+    answer = next(message for message in SAMPLES if type(message) is Target).model_copy(update={"final": True})
+    playback = Playback(HostOptions(robot="r", stages=ALL), None, None)
+
+    def answer_to(number):
+        target = answer.model_copy(update={"episode_id": f"e{number}"}, deep=True)
+        playback._take(Received(topics.TARGET.key("r"), topics.TARGET, target, number))
+
+    answer_to(0)
+    gc.collect()
+    before = sys.getallocatedblocks()
+    for number in range(1, 2 * MAX_TARGETS):
+        answer_to(number)
+    gc.collect()
+    assert (sys.getallocatedblocks() - before) / MAX_TARGETS < 10
+    kept = playback.finish(1.0).targets
+    assert [target.episode_id for target in kept] == [f"e{number}" for number in range(MAX_TARGETS, 2 * MAX_TARGETS)]
+    assert kept[0] == answer.model_copy(update={"episode_id": f"e{MAX_TARGETS}"})

@@ -15,7 +15,7 @@ from .config import RosAnswerConfig
 from .names import Qos, node_name
 from .people import Box, Quaternion, head_places, people_of
 from .robot_pose import PoseRefused, of_message
-from .ros_node import RosNode, RosPublisher
+from .ros_node import RosNode, RosPublisher, run_linked
 from .ros_types import BadCdr, RosTypes, stamp_ns
 from .stamping import Stamping
 from .targets import POINTED_TARGET, pointed_target
@@ -86,12 +86,7 @@ class RosAnswerStage:
 
     def run(self) -> None:
         """Until shutdown."""
-        self._ros.start()
-        try:
-            while self._node.wait(LONGEST_WAIT_S):
-                self.step()
-        finally:
-            self._ros.stop()
+        run_linked(self._ros, self._node, self.step, LONGEST_WAIT_S)
 
     def step(self) -> None:
         """One turn of the loop."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import cv2
+from deixis_runtime.camera_status import CameraStatus
 from deixis_runtime.queries import Query
 from deixis_runtime.settings import ConfigError
 from deixis_runtime.stage import Node, run_stage
@@ -16,11 +17,10 @@ from .intrinsics import LensRefused, RosLens, assumed, of_camera_info
 from .names import Qos, camera_info_beside, node_name
 from .pictures import PictureRefused, of_compressed, of_image
 from .preparation import Prepared, prepare
-from .ros_node import Arrived, Newest, RosNode
+from .ros_node import Arrived, Newest, RosNode, run_linked
 from .ros_sources import why_silent
 from .ros_types import BadCdr, RosTypes, stamp_ns
 from .stamping import Stamped, Stamping
-from .status import CameraStatus
 
 IMAGE, COMPRESSED, CAMERA_INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
 INFO_PERIOD_S = 2.0
@@ -58,12 +58,7 @@ class RosCameraStage:
 
     def run(self) -> None:
         """Until shutdown."""
-        self._ros.start()
-        try:
-            while self._node.wait(LONGEST_WAIT_S):
-                self.step()
-        finally:
-            self._ros.stop()
+        run_linked(self._ros, self._node, self.step, LONGEST_WAIT_S)
 
     def step(self) -> None:
         """One turn of the loop."""
@@ -157,7 +152,7 @@ class RosCameraStage:
             self._node.warn("shape", f"{self._lenses.topic} is for {is_for}, pictures have {width} x {height}: it is not used")
             lens = None
         lens = lens or assumed(width, height, self._config.horizontal_fov_deg)
-        if self._status.sees_through(lens):
+        if self._status.projects(lens.width, lens.height, lens):
             self._node.note("intrinsics", f"intrinsics: {lens.source}")
 
     # --- what is said of it -------------------------------------------------------------------------------------------

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
-from deixis_runtime.lens import Lens, LensError, Matrix, check_matrix, same_aspect
+from deixis_runtime.lens import DistortionModel, Lens, LensError, Matrix, check_matrix, same_aspect
 
-DistortionModel = Literal["none", "plumb_bob", "rational_polynomial", "equidistant"]
 COEFFICIENTS: dict[str, tuple[int, ...]] = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 ROUNDED = 1e-9
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import zenoh
 from deixis_runtime.session import Unreachable, first_line, open_client
+from deixis_runtime.stage import Node
 from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 
 from .attachment import Attachment, BadAttachment
@@ -230,3 +231,13 @@ class RosNode:
     def _token(self, session: zenoh.Session, kind: Kind, type_name: str, topic: str, qos: Qos) -> str:
         endpoint = Endpoint(self.name.name, topic, dds_type(type_name), self._types.hash_of(type_name))
         return endpoint_token(str(session.info.zid()), next(self._numbers), kind, self.name, endpoint, qos)
+
+
+def run_linked(ros: RosNode, node: Node, step: Callable[[], None], longest_wait_s: float) -> None:
+    """The loop of a bridge: its steps until shutdown, linked to ROS as far as its router is there."""
+    ros.start()
+    try:
+        while node.wait(longest_wait_s):
+            step()
+    finally:
+        ros.stop()

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Protocol
 
 import yaml
-from deixis_runtime.lens import Matrix, check_matrix, same_aspect
+from deixis_runtime.lens import DistortionModel, Matrix, check_matrix, same_aspect
 from deixis_schemas.codec import say
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-DistortionModel = Literal["none", "plumb_bob", "rational_polynomial", "equidistant"]
 COEFFICIENTS: dict[DistortionModel, tuple[int, ...]] = {
     "none": (0,),
     "plumb_bob": (4, 5),

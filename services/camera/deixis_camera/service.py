@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import cv2
+from deixis_runtime.camera_status import CameraStatus
 from deixis_runtime.queries import Query
 from deixis_runtime.stage import Node, run_stage
 from deixis_schemas import topics
@@ -14,7 +15,6 @@ from .calibration import AssumedFieldOfView, Calibration, CalibrationError, load
 from .capture import Capture
 from .config import CameraConfig
 from .handoff import Became, Handoff, Item, Noted, Opened, Ready, Refused
-from .info import CameraStatus
 from .link_control import LinkControl
 from .pacing import LOCKSTEP_EPOCH_NS, Lockstep, OwnRate, Readiness, missing
 from .sources import without_credentials
@@ -35,7 +35,7 @@ class CameraStage:
         self._frames = node.publish(topics.FRAME)
         self._infos = node.publish(topics.CAMERA_INFO)
         self._beliefs = node.subscribe(topics.BELIEF, depth=8) if node.lockstep else None
-        self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, node.lockstep)
+        self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, lockstep=node.lockstep)
         self.handoff = Handoff()
         self._link = LinkControl(node, config)
         self._lockstep = Lockstep(config.lockstep_timeout_s)

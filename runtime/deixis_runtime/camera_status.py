@@ -1,17 +1,38 @@
-"""What the stage says of its camera: the content of CameraInfo, and whether it is news."""
+"""What a camera stage says of its camera: the content of CameraInfo, and whether it is news."""
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from deixis_schemas.messages import CameraInfo, CameraMount, CameraState, Producer
 
-from .calibration import Intrinsics
-from .config import Mount
+from .lens import DistortionModel, Matrix
+
+
+class Projection(Protocol):
+    """How pictures of one size project. `source`: where that is known from, one sentence."""
+
+    @property
+    def camera_matrix(self) -> Matrix:
+        """K, row-major, pixels with the origin at the centre of the top left one."""
+
+    @property
+    def distortion_model(self) -> DistortionModel:
+        """Which one the coefficients are of."""
+
+    @property
+    def distortion(self) -> tuple[float, ...]:
+        """The coefficients."""
+
+    @property
+    def source(self) -> str:
+        """Where it comes from."""
 
 
 class CameraStatus:
     """State of the camera, kept by the loop thread. `changed`: there is news since it was last set to False."""
 
-    def __init__(self, producer: Producer, source: str, mount: Mount, lockstep: bool) -> None:
+    def __init__(self, producer: Producer, source: str, mount: CameraMount, *, lockstep: bool = False) -> None:
         self._info = CameraInfo(
             stamp_ns=0,
             stage=producer.stage,
@@ -21,7 +42,7 @@ class CameraStatus:
             mount=CameraMount(**mount.model_dump()),
             lockstep=lockstep,
         )
-        self._intrinsics: Intrinsics | None = None
+        self._projection: Projection | None = None
         self.changed = True
 
     @property
@@ -42,15 +63,15 @@ class CameraStatus:
         self.changed |= rate_hz != self._info.rate_hz
         self._info.rate_hz = rate_hz
 
-    def projects(self, width: int, height: int, intrinsics: Intrinsics) -> bool:
-        """Pictures of this size follow, with these intrinsics; whether that is news."""
+    def projects(self, width: int, height: int, projection: Projection) -> bool:
+        """Pictures of this size follow, which project so; whether that is news."""
         info = self._info
-        news = (width, height) != (info.width, info.height) or intrinsics != self._intrinsics
+        news = (width, height) != (info.width, info.height) or projection != self._projection
         if news:
-            self._intrinsics = intrinsics
-            info.width, info.height, info.camera_matrix = width, height, intrinsics.camera_matrix
-            info.distortion_model, info.distortion = intrinsics.distortion_model, list(intrinsics.distortion)
-            info.intrinsics = intrinsics.source
+            self._projection = projection
+            info.width, info.height, info.camera_matrix = width, height, projection.camera_matrix
+            info.distortion_model, info.distortion = projection.distortion_model, list(projection.distortion)
+            info.intrinsics = projection.source
         self.changed |= news
         return news
 

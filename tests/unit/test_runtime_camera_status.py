@@ -3,7 +3,7 @@
 import pytest
 from deixis_camera.calibration import Intrinsics
 from deixis_camera.config import CameraConfig, Mount
-from deixis_camera.info import CameraStatus
+from deixis_runtime.camera_status import CameraStatus
 from deixis_schemas import codec
 from deixis_schemas.messages import CameraInfo, CameraMount, Producer
 from pydantic import ValidationError
