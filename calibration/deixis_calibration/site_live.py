@@ -30,6 +30,8 @@ TURN_S = 0.1
 LOWER_S = 4.0
 SILENT_S = 5.0
 BELL = "\a"
+THANKS = "  thank you: lower the hand"
+NOT_HELD = "  no pointing was held; what fusion made of these seconds counts"
 
 
 @dataclass(frozen=True)
@@ -61,9 +63,12 @@ def guide(session: Session, console: Console) -> tuple[Heard, Labels, bool]:
         task = progress.add_task("", total=len(asked))
         try:
             for one in asked:
-                label = _ask(one, session, names, listener, progress)
+                _come(one, session, progress)
+                held, label = _ask(one, names, listener, progress)
                 labelled += [label] if label is not None else []
                 progress.advance(task)
+                console.print(THANKS if held else NOT_HELD)
+                _lower(listener)
         except (KeyboardInterrupt, EOFError):
             console.print("ended early: what was pointed at until now counts")
             early = True
@@ -113,27 +118,29 @@ class Listener:
         return max(0.0, (stamp_ns - frames[0].source.stamp_ns) / 1e9) if frames else 0.0
 
 
-def _ask(one: Asked, session: Session, names: dict[str, str], listener: Listener, progress: Progress) -> Labelled | None:
-    say = progress.console.print
+def _come(one: Asked, session: Session, progress: Progress) -> None:
+    """Have the person walk to the spot. Raises EOFError or KeyboardInterrupt."""
     if one.first_at_spot:
         x, y = session.labels.spots[one.spot]
-        _pause(
-            progress, f"Stand at spot {one.spot} (map {x:.2f}, {y:.2f}), facing the robot. Enter when somebody stands there: "
-        )
-    say(f"{BELL}Point at [bold]{one.poi_id}[/bold], {names[one.poi_id]}, look at it, and hold.")
+        where = f"spot {one.spot} (map {x:.2f}, {y:.2f}), facing the robot"
+        _pause(progress, f"Stand at {where}. Enter when somebody stands there: ")
+
+
+def _ask(one: Asked, names: dict[str, str], listener: Listener, progress: Progress) -> tuple[bool, Labelled | None]:
+    """Have the person point. Whether that was held, and when it was; none where nothing was seen meanwhile."""
+    progress.console.print(f"{BELL}Point at [bold]{one.poi_id}[/bold], {names[one.poi_id]}, look at it, and hold.")
     listener.drop()
     watch = HoldWatch()
-    state = _wait(listener, watch.hear, {"held", "given up"})
-    begin_ns, end_ns = watch.span_ns
-    if state != "held":
-        say("  no pointing was held; what fusion made of these seconds counts")
-    else:
-        say("  thank you: lower the hand")
-        end_s = time.monotonic() + LOWER_S
-        while time.monotonic() < end_s and (not (come := listener.gestures()) or somebody_points(come[-1])):
-            pass
-    from_s, to_s = listener.seconds(begin_ns), listener.seconds(end_ns)
-    return Labelled(poi_id=one.poi_id, spot=one.spot, from_s=from_s, to_s=to_s) if to_s > from_s else None
+    held = _wait(listener, watch.hear, {"held", "given up"}) == "held"
+    from_s, to_s = (listener.seconds(stamp_ns) for stamp_ns in watch.span_ns)
+    return held, Labelled(poi_id=one.poi_id, spot=one.spot, from_s=from_s, to_s=to_s) if to_s > from_s else None
+
+
+def _lower(listener: Listener) -> None:
+    """Until nobody points, for a few seconds at most."""
+    end_s = time.monotonic() + LOWER_S
+    while time.monotonic() < end_s and (not (come := listener.gestures()) or somebody_points(come[-1])):
+        pass
 
 
 def _wait(listener: Listener, hear: Callable[[Gestures], str], ends: set[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -18,8 +18,8 @@ from .mount_fit import MountFit, MountFitError, fit_mount
 from .pointings import Pointing
 from .site_confusion import Read, hand_table, head_table
 from .site_labels import Labels
-from .site_session import Heard, answers, measured
-from .told_apart import Standing, standings
+from .site_session import Heard, answer, measured
+from .told_apart import Standing, Try, standings
 
 NEAR_DEG = 20.0
 """POIs nearer to each other, seen from where somebody stood, are hard to tell apart."""
@@ -27,7 +27,8 @@ NEAR_DEG = 20.0
 
 @dataclass(frozen=True)
 class SiteReport:
-    """before, after: how each POI fared with the mount as it was and as corrected, with the site's own tables.
+    """before, after: how each POI fared as it was, and with mount and tables as corrected. There each pointing is judged by
+    what was made of all the others: what it has helped to make would judge it too well.
 
     near: pairs of POIs with the degrees between them, from the spot where they lie closest. fit: none, with `why`, where too
     little was measured.
@@ -43,30 +44,52 @@ class SiteReport:
     head: HeadConfusion
 
 
+@dataclass(frozen=True)
+class Correction:
+    """What some pointings say of a site. fit: none, with `why`, where they are too few."""
+
+    fit: MountFit | None
+    why: str
+    tables: ConfusionConfig
+
+
 def judge(heard: Heard, labels: Labels, site: Site, config: FusionConfig, source: str) -> SiteReport:
     """All that a session says; `source` is what the tables are named after. Raises SessionError."""
-    pois = {poi.poi_id: poi for poi in site.pois}
-    pointings = list(measured(heard, labels, site))
+    pointings = measured(heard, labels, site)
+    known = [one for one in pointings if one is not None]
     mount = heard.camera.mount if heard.camera is not None else CameraMount()
+    whole = _correction(known, labels, site, mount, source)
+    return SiteReport(
+        before=standings([answer(heard, label, site, config, mount) for label in labels.pointings]),
+        after=standings(list(_judged_by_the_others(heard, pointings, labels, site, config, mount))),
+        near=near_pairs(site, labels),
+        pointings=len(known),
+        fit=whole.fit,
+        why=whole.why,
+        hand=whole.tables.hand,
+        head=whole.tables.head,
+    )
+
+
+def _judged_by_the_others(
+    heard: Heard, pointings: Sequence[Pointing | None], labels: Labels, site: Site, config: FusionConfig, mount: CameraMount
+) -> Iterator[Try]:
+    """What fusion would answer to each pointing, had it been corrected by all the others."""
+    for number, label in enumerate(labels.pointings):
+        others = [one for place, one in enumerate(pointings) if one is not None and place != number]
+        made = _correction(others, labels, site, mount, "the others")
+        corrected = config.model_copy(update={"confusion": made.tables})
+        yield answer(heard, label, site, corrected, made.fit.mount if made.fit is not None else mount)
+
+
+def _correction(pointings: Sequence[Pointing], labels: Labels, site: Site, mount: CameraMount, source: str) -> Correction:
     fit, why = None, ""
     try:
-        fit = fit_mount(pointings, pois, labels.spots, mount, labels.person_height_m)
+        fit = fit_mount(pointings, {poi.poi_id: poi for poi in site.pois}, labels.spots, mount, labels.person_height_m)
     except MountFitError as error:
         why = str(error)
-    corrected = fit.mount if fit is not None else mount
     reads = list(_reads(pointings, site, labels))
-    hand, head = hand_table(reads, source), head_table(reads, source)
-    tables = config.model_copy(update={"confusion": ConfusionConfig(hand=hand, head=head)})
-    return SiteReport(
-        before=standings(answers(heard, labels, site, config, mount)),
-        after=standings(answers(heard, labels, site, tables, corrected)),
-        near=near_pairs(site, labels),
-        pointings=len(pointings),
-        fit=fit,
-        why=why,
-        hand=hand,
-        head=head,
-    )
+    return Correction(fit, why, ConfusionConfig(hand=hand_table(reads, source), head=head_table(reads, source)))
 
 
 def near_pairs(site: Site, labels: Labels) -> list[tuple[str, str, float]]:
@@ -85,7 +108,7 @@ def near_pairs(site: Site, labels: Labels) -> list[tuple[str, str, float]]:
 
 def text_of(report: SiteReport, names: Mapping[str, str]) -> str:
     """For people."""
-    lines = [f"{report.pointings} pointings measured"]
+    lines = [f"{report.pointings} pointings measured; 'as corrected' each is judged by what the others say, and not by itself"]
     earlier = {standing.poi_id: standing for standing in report.before}
     for standing in report.after:
         before = earlier[standing.poi_id]

@@ -31,7 +31,7 @@ from .told_apart import Try
 
 SELF = Producer("fusion", "calibrate")
 AROUND_NS = 1_000_000_000
-"""Fusion learns a person's place before a stroke, and ends it after."""
+"""Fusion learns a person's place before a stroke, and ends it after; who walks about in between matters not."""
 
 
 class SessionError(ValueError):
@@ -64,14 +64,11 @@ class Heard:
         """The frames of one pointing."""
         frames = self.tracked()
         first_ns = frames[0].source.stamp_ns if frames else 0
-        begin_ns, end_ns = (first_ns + round(at_s * 1e9) for at_s in (label.from_s, label.to_s))
-        return [frame for frame in frames if begin_ns <= frame.source.stamp_ns <= end_ns]
+        return self.between(*(first_ns + round(at_s * 1e9) for at_s in (label.from_s, label.to_s)))
 
-    def around(self, spans: Sequence[Sequence[JoinedFrame]]) -> list[JoinedFrame]:
-        """The frames of these pointings and those shortly before and after: who walks about in between matters not."""
-        ends = [(span[0].source.stamp_ns - AROUND_NS, span[-1].source.stamp_ns + AROUND_NS) for span in spans]
-        frames = self.tracked()
-        return [frame for frame in frames if any(first <= frame.source.stamp_ns <= last for first, last in ends)]
+    def between(self, first_ns: int, last_ns: int) -> list[JoinedFrame]:
+        """The frames that the tracker has answered, from one time to another, both included."""
+        return [frame for frame in self.tracked() if first_ns <= frame.source.stamp_ns <= last_ns]
 
     def place_at(self, stamp_ns: int, start: RobotPlace) -> RobotPlace:
         """Where the robot was, as last told before; `start` where it has told nothing."""
@@ -94,18 +91,19 @@ def start_of(site: Site) -> RobotPlace:
     return RobotPlace(site.robot_pose.x_m, site.robot_pose.y_m, site.robot_pose.yaw_deg)
 
 
-def measured(heard: Heard, labels: Labels, site: Site) -> Iterator[Pointing]:
-    """What was measured of each labelled pointing of which a face was seen. Raises SessionError."""
+def measured(heard: Heard, labels: Labels, site: Site) -> list[Pointing | None]:
+    """What was measured of each labelled pointing, in their order; none where no face was seen. Raises SessionError."""
     lens = heard.lens
-    for label in labels.pointings:
-        frames = heard.within(label)
-        person = pointing_person(frames)
-        if person is None:
-            continue
-        robot = heard.place_at(frames[-1].source.stamp_ns, start_of(site))
-        pointing = pointing_of(label.poi_id, label.spot, person, list(_of(person, frames)), lens, robot)
-        if pointing is not None:
-            yield pointing
+    return [_measured(heard, label, lens, site) for label in labels.pointings]
+
+
+def _measured(heard: Heard, label: Labelled, lens: Lens, site: Site) -> Pointing | None:
+    frames = heard.within(label)
+    person = pointing_person(frames)
+    if person is None:
+        return None
+    robot = heard.place_at(frames[-1].source.stamp_ns, start_of(site))
+    return pointing_of(label.poi_id, label.spot, person, list(_of(person, frames)), lens, robot)
 
 
 def pointing_person(frames: Sequence[JoinedFrame]) -> int | None:
@@ -120,20 +118,19 @@ def pointing_person(frames: Sequence[JoinedFrame]) -> int | None:
     return max(seen, key=lambda person: seen[person], default=None)
 
 
-def answers(heard: Heard, labels: Labels, site: Site, config: FusionConfig, mount: CameraMount) -> list[Try]:
-    """What fusion answers to each labelled pointing with this mount and these settings. Raises SessionError."""
+def answer(heard: Heard, label: Labelled, site: Site, config: FusionConfig, mount: CameraMount) -> Try:
+    """What fusion answers to a labelled pointing with this mount and these settings. Raises SessionError."""
     if heard.camera is None:
         raise SessionError("the camera never told its lens (camera/info)")
-    spans = [frames for label in labels.pointings if (frames := heard.within(label))]
-    targets = list(_targets(heard.around(spans), heard.robot, site, config, heard.camera.model_copy(update={"mount": mount})))
-    tries = []
-    for label in labels.pointings:
-        frames = heard.within(label)
-        stamps = (frames[0].source.stamp_ns, frames[-1].source.stamp_ns) if frames else (0, 0)
-        own = [target for target in targets if target.final and target.started_ns <= stamps[1] and target.ended_ns >= stamps[0]]
-        longest = max(own, key=lambda target: min(target.ended_ns, stamps[1]) - max(target.started_ns, stamps[0]), default=None)
-        tries.append(Try(label.poi_id, None if longest is None else tuple(longest.poi_ids)))
-    return tries
+    frames = heard.within(label)
+    if not frames:
+        return Try(label.poi_id, None)
+    camera = heard.camera.model_copy(update={"mount": mount})
+    first_ns, last_ns = frames[0].source.stamp_ns, frames[-1].source.stamp_ns
+    targets = _targets(heard.between(first_ns - AROUND_NS, last_ns + AROUND_NS), heard.robot, site, config, camera)
+    own = [target for target in targets if target.final and target.started_ns <= last_ns and target.ended_ns >= first_ns]
+    longest = max(own, key=lambda target: min(target.ended_ns, last_ns) - max(target.started_ns, first_ns), default=None)
+    return Try(label.poi_id, None if longest is None else tuple(longest.poi_ids))
 
 
 def _targets(

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from importlib.metadata import entry_points
 
 from deixis_runtime.host import HostFailed
 from deixis_runtime.session import Unreachable, exit_now
 from deixis_runtime.stage import setup_logging
 
+from . import overview
 from .options import CommandError
 from .own_output import keep_output_to_ourselves
-
-GROUP = "deixis.commands"
 
 
 def parser(wanted: str | None = None) -> argparse.ArgumentParser:
     """The command line with all subcommands that are installed here; with the `wanted` one alone where it is one of them."""
-    top = argparse.ArgumentParser(prog="deixis", description="Tells a robot which thing a person is pointing at.")
+    top = argparse.ArgumentParser(prog="deixis", description=overview.DESCRIPTION)
     subparsers = top.add_subparsers(metavar="COMMAND", required=True)
-    installed = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    installed = overview.installed()
     for entry in [entry for entry in installed if entry.name == wanted] or installed:
         try:
             entry.load()(subparsers)
@@ -45,7 +43,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def command() -> None:
-    """The console script: leaves at once when the command is done, whatever threads a cut session has left."""
+    """What the console script (`entry`) runs: leaves at once when it is done, whatever threads a cut session has left."""
     keep_output_to_ourselves()
     try:
         status = main()

@@ -149,7 +149,8 @@ class McapReader:
                 self.cut = any_read and not file.read(1)
                 if self.cut:
                     return
-                raise McapFileError(f"'{self.path}' is no MCAP file, or damaged: {str(error)[:200] or 'it is empty'}") from None
+                what = "is damaged" if any_read else "is no MCAP file, or damaged"
+                raise McapFileError(f"'{self.path}' {what}: {' '.join(str(error).split())[:200] or 'it is empty'}") from None
             if record is None:
                 return
             any_read = True

@@ -119,7 +119,11 @@ def _check_share(stage: str, phase: Phase, found: Sequence[Answer]) -> Result:
 
 def _stranger(phase: Phase, found: Sequence[Answer]) -> str | None:
     there = {item.frame_id for item in phase.fed}
-    stranger = next((answer.message.frame_id for answer in found if answer.message.frame_id not in there), None)
+    first = phase.fed[0].frame_id
+    # What was on its way to the stage when the phase began is no stranger.
+    answered = [answer.message.frame_id for answer in found]
+    known = {frame for frame in answered if frame.run == first.run and frame.seq < first.seq}
+    stranger = next((frame for frame in answered if frame not in there | known), None)
     return None if stranger is None else f"answers {_say(stranger)}, which was not there"
 
 

@@ -3,7 +3,9 @@
 import os
 import re
 import signal
+import socket
 import subprocess
+import tempfile
 from contextlib import contextmanager
 from functools import cache
 
@@ -23,6 +25,7 @@ from deixis_view.floor import FIELD_OF_VIEW_M, shown
 from deixis_view.hearing import hear, keys_of
 from deixis_view.known import Known
 from deixis_view.scene import UNRECORDED, Scene
+from deixis_view.workplace import remove_left
 from headless_browser import needs_chromium, page
 from rerun_ready import columns, needs_rerun
 from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, wait_until
@@ -277,3 +280,63 @@ def test_a_recording_that_cannot_be_read_costs_no_file_and_opens_no_page(tmp_pat
         assert main(["view", str(recording), "--web", "--port", "0"]) == 1
         assert capsys.readouterr().out == ""
     assert out.read_bytes() == b"drawn before"
+
+
+@needs_rerun
+def test_a_port_that_is_taken_is_said_in_one_line_and_no_viewer_is_started(run, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("deixis_view.viewer_process.ViewerProcess._start", lambda _: pytest.fail("a viewer is started"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["view", str(run / "pointing.mcap"), "--web", "--port", str(port)]) == 1
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", f"deixis: --port {port}: Address already in use\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_rerun
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_view_that_is_killed_leaves_no_folder_or_the_next_removes_it(run, tmp_path, monkeypatch, number):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+
+    def looked_at():
+        log = tmp_path / f"log-{len(list(tmp_path.glob('log-*')))}"
+        return process(command("deixis", "view", run / "pointing.mcap", "--web", "--port", 0), log), log
+
+    def folders():
+        return list(tmp_path.glob("deixis-view-*"))
+
+    started, log = looked_at()
+    with started as child:
+        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", 60.0, log)
+        (left,) = folders()
+        child.send_signal(number)
+        child.wait(30)
+    assert folders() == ([] if number == signal.SIGTERM else [left])
+    if folders():
+        os.utime(left, (0, 0))  # one that was just made is let alone
+    started, log = looked_at()
+    with started:
+        wait_until(lambda: "shows it to browsers" in log.read_text(), "the page's address", 60.0, log)
+        (used,) = folders()
+        assert used != left
+        os.utime(used, (0, 0))
+        remove_left(tmp_path)
+        assert folders() == [used], "one that is used stays, however old"
+
+
+@needs_rerun
+def test_damage_deep_in_a_recording_is_said_in_one_line_and_what_comes_before_it_is_drawn(run, tmp_path, capsys):
+    damaged, out = tmp_path / "damaged.mcap", tmp_path / "out.rrd"
+    content = bytearray((run / "pointing.mcap").read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 64] = bytes(64)
+    damaged.write_bytes(content)
+    assert main(["view", str(damaged), "--site", str(SITE), "--out", str(out)]) == 1
+    said = [line for line in capsys.readouterr().err.splitlines() if "damaged.mcap" in line]
+    assert said[0].startswith(f"deixis view: '{damaged}' is damaged: ")
+    assert said[0].endswith("; what comes before that is drawn")
+    assert subprocess.run([BIN / "rerun", "rrd", "verify", out], capture_output=True, check=False).returncode == 0
+    drawn_before = len({row["seq"] for row in columns(out)["/picture/tracks"]})
+    assert 5 < drawn_before < DRAWN

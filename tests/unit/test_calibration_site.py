@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deixis_calibration import site_report
 from deixis_calibration.mount_fit import MountFitError, fit_mount
-from deixis_calibration.pointings import ORIGIN, Pointing
 from deixis_calibration.site_confusion import Read, hand_table, head_table
 from deixis_calibration.site_guide import HoldWatch, plan
 from deixis_calibration.told_apart import Try, standings
@@ -17,60 +17,11 @@ from deixis_cli.mcap_file import McapRecorder
 from deixis_cli.raw_message import RawMessage
 from deixis_fusion.config import FusionConfig
 from deixis_fusion.confusion import fig_6, table_1
-from deixis_fusion.localisation import RobotPlace, wrapped_deg
-from deixis_runtime.mount import to_base
+from deixis_fusion.localisation import RobotPlace
 from deixis_runtime.site import load_site
 from deixis_schemas import codec, topics
-from deixis_schemas.anatomy import FACE_WIDTH_M
-from deixis_schemas.messages import (
-    CameraInfo,
-    CameraMount,
-    FrontalFace,
-    Gesture,
-    Gestures,
-    HeadPose,
-    HeadPoses,
-    KindProbabilities,
-    Poi,
-    Track,
-    Tracks,
-)
-
-SPOTS = {"A": (2.0, 0.0), "B": (2.4, 0.7), "C": (1.6, -0.5)}
-POIS = {
-    name: Poi(poi_id=name, position_m=(*xy, 1.25))
-    for name, xy in {
-        **{"P1": (3.4, 1.7), "P2": (2.6, 2.4), "P3": (0.95, 1.82), "P4": (0.2, 1.05)},
-        **{"P6": (0.2, -1.04), "P7": (0.8, -1.75), "P8": (1.7, -1.9), "P9": (2.6, -2.2)},
-    }.items()
-}
-TRUE = CameraMount(position_m=(0.1, 0.0, 1.3), yaw_deg=4.0, pitch_up_deg=1.0)
-BELIEVED = CameraMount(position_m=(0.1, 0.0, 1.3), yaw_deg=0.0, pitch_up_deg=3.0)
-HEAD_M, FOCAL = 1.62, 560.0
-
-
-def optical_of(place, mount):
-    """A point in base_link as the camera sees it: the inverse of the mount, column by column."""
-    turn = np.array([to_base(axis, mount) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]).T
-    return tuple(np.linalg.inv(turn) @ (np.array(place) - mount.position_m))
-
-
-def bearing_from(spot, poi, camera=TRUE.position_m):
-    to_camera = math.atan2(camera[1] - spot[1], camera[0] - spot[0])
-    return wrapped_deg(math.degrees(math.atan2(poi[1] - spot[1], poi[0] - spot[0]) - to_camera))
-
-
-def simulated(rounds=2, seed=0, robot=ORIGIN, standing_m=0.02):
-    """Pointings as the stages would measure them of people who sway, whose arms and heads err and turn part of the way."""
-    rng = np.random.default_rng(seed)
-    for spot, at in SPOTS.items():
-        for name, poi in list(POIS.items()) * rounds:
-            x, y = np.array(at) + rng.normal(0, standing_m, 2)
-            head = np.array(optical_of((x, y, HEAD_M), TRUE)) * math.exp(rng.normal(0, 0.04))
-            bearing = bearing_from((x, y), poi.position_m)
-            side = "point_left" if bearing > 0 else "point_right"
-            pointed = bearing + rng.normal(0, 8)
-            yield Pointing(name, spot, tuple(head), side, pointed, 8.0, False, 0.9 * bearing + rng.normal(0, 6), 4.0, robot)
+from deixis_schemas.messages import CameraInfo, Gesture, Gestures, Poi
+from pointing_people import BELIEVED, POIS, SPOTS, TRUE, camera_info, messages_of, simulated, write_site
 
 
 def test_a_camera_that_is_four_degrees_off_is_corrected_within_half_a_degree():
@@ -174,45 +125,13 @@ def test_a_pointing_has_to_be_held_and_is_waited_for_so_long():
     assert [nobody.hear(gestures_at(t, **idle)) for t in (0, 10, 16)] == ["waiting", "waiting", "given up"]
 
 
-def messages_of(pointing, seq):
-    """A frame in which somebody points, as the three stages tell it."""
-    of = {"run": 1, "seq": seq, "stamp_ns": 1_000_000_000 + round(seq * 1e9 / 10), "instance": "x"}
-    x, y, z = pointing.head_m
-    width = FOCAL * FACE_WIDTH_M / z
-    at = FOCAL * x / z + 319.5, FOCAL * y / z + 239.5
-    face = Track(
-        track_id=0,
-        person_id=0,
-        kind="face",
-        kind_probabilities=KindProbabilities(face=1),
-        centroid_px=at,
-        bbox_px=(at[0] - (width - 1) / 2, at[1] - (width - 1) / 2, width, width),
-        velocity_px_s=(0, 0),
-        frontal=FrontalFace(centre_px=at, width_px=width),
-    )
-    yaw = max(-120.0, min(120.0, pointing.yaw_deg))
-    head = HeadPose(person_id=0, status="tracking", yaw_deg=yaw, yaw_sigma_deg=4.0, face_width_px=width)
-    hand = {"phase": "idle", "gesture": "none"}
-    if pointing.gesture is not None:
-        bearing = wrapped_deg(pointing.bearing_deg)
-        hand = {"phase": "stroke", "gesture": pointing.gesture, "bearing_deg": bearing, "bearing_sigma_deg": 8.0}
-    yield Tracks(**of, stage="tracker", width=640, height=480, tracks=[face])
-    yield HeadPoses(**of, stage="headpose", poses=[head])
-    yield Gestures(**of, stage="gesture", gestures=[Gesture(person_id=0, **hand)])
-
-
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     """A site file, the recording of a session in it, and its labels."""
     folder = tmp_path_factory.mktemp("session")
-    pois = "\n".join(f"  - {{ poi_id: {name}, position_m: {list(poi.position_m)} }} # {name}" for name, poi in POIS.items())
-    mount = "mount: { position_m: [0.1, 0.0, 1.3], yaw_deg: 0.0, pitch_up_deg: 3.0 } # by protractor"
-    (folder / "site.yaml").write_text(f"# the hall\ncamera:\n  {mount}\npois:\n{pois}\n")
+    write_site(folder / "site.yaml")
     key, seq, labelled = {"Tracks": topics.TRACKS, "HeadPoses": topics.HEAD_POSES, "Gestures": topics.GESTURES}, 0, []
-    info = CameraInfo(
-        stamp_ns=1, stage="camera", instance="x", state="streaming", source="0", width=640, height=480, mount=BELIEVED,
-        camera_matrix=(FOCAL, 0, 319.5, 0, FOCAL, 239.5, 0, 0, 1),
-    )  # fmt: skip
+    info = camera_info()
     with McapRecorder(folder / "session.mcap") as recorder:
         recorder.write(RawMessage(topics.CAMERA_INFO.key("r"), codec.encoding_of(CameraInfo), codec.encode(info), 1))
         for pointing in simulated(rounds=1):
@@ -296,3 +215,25 @@ def test_labels_that_name_no_spot_are_refused_by_field(session, tmp_path, capsys
     (tmp_path / "labels.yaml").write_text(json.dumps(labels))
     assert calibrate(session, "--labels", tmp_path / "labels.yaml") == 1
     assert "pointings.2.spot: 'Z' is none of the spots" in capsys.readouterr().err
+
+
+def test_no_pointing_is_judged_by_tables_and_a_mount_that_it_helped_to_make(session, monkeypatch, capsys):
+    tables, mounts = [], []
+
+    def noted(heard, label, site, config, mount, _answer=site_report.answer):
+        tables.append(config.confusion)
+        mounts.append(mount)
+        return _answer(heard, label, site, config, mount)
+
+    reads = []
+    monkeypatch.setattr(site_report, "answer", noted)
+    monkeypatch.setattr(site_report, "head_table", lambda given, source: reads.append(given) or head_table(given, source))
+    assert calibrate(session, "--json") in (0, 3)
+    said = json.loads(capsys.readouterr().out)
+    whole, *others = reads
+    assert [[one for one in whole if one not in some] for some in others] == [[one] for one in whole]
+    as_it_is, corrected = mounts[: len(whole)], mounts[len(whole) :]
+    assert set(map(repr, as_it_is)) == {repr(BELIEVED)}
+    assert len(set(map(repr, corrected))) == len(whole), "each has a mount of its own"
+    assert repr(said["mount"]["mount"]) not in {repr(mount.model_dump()) for mount in corrected}
+    assert all(one.head.model_dump() != said["head"] for one in tables[len(whole) :])

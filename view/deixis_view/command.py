@@ -63,7 +63,8 @@ def register(subparsers: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Draw until Ctrl-C, --seconds, or the window is closed: then 0; a recording into a file until its end.
+    """Draw until Ctrl-C, --seconds, or the window is closed: then 0; a recording into a file until its end. 1 where that is
+    damaged, with what came before it drawn.
 
     Raises CommandError, or Unreachable without a router.
     """
@@ -80,8 +81,9 @@ def run(given: argparse.Namespace) -> int:
             scene = scene_of(known, draw_options(given), live=given.file is None)
             painter = Painter(scene, sink)
             show = Showing(viewer, interrupts, until_s)
+            damage = ""
             if raws is not None:
-                _recorded(given, raws, painter, show)
+                damage = _recorded(given, raws, painter, show)
             elif session is not None:
                 _live(given, session, scene, painter, show)
             if not sink.close() and given.out is not None:
@@ -90,7 +92,7 @@ def run(given: argparse.Namespace) -> int:
         raise CommandError(str(error)) from None
     if painter.left_out:
         print(f"deixis view: {painter.left_out} frames were left out: the viewer did not keep up", file=sys.stderr)
-    return 0
+    return 1 if damage else 0
 
 
 class Showing:
@@ -99,13 +101,18 @@ class Showing:
     def __init__(self, viewer: ViewerProcess | None, interrupts: Interrupts, until_s: float | None) -> None:
         self._viewer, self._interrupts, self._until_s = viewer, interrupts, until_s
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody asked us to stop."""
+        return self._interrupts.requested()
+
     def stopped(self) -> bool:
         """Whether it is over. Raises ViewerError where the viewer has died."""
         if self._viewer is not None and self._viewer.closed():
             if failure := self._viewer.failure():
                 raise ViewerError(failure)
             return True
-        return self._interrupts.requested() or (self._until_s is not None and time.monotonic() > self._until_s)
+        return self.interrupted or (self._until_s is not None and time.monotonic() > self._until_s)
 
     def stay(self) -> None:
         """Until it is over."""
@@ -130,11 +137,13 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
     if given.out is not None:
         yield None, sink_for_file(given.out, name=name)
         return
-    sink = new_sink(name, live=given.file is None)
+    viewer = ViewerProcess(window=not given.web)
     with ExitStack() as stack:
-        viewer = stack.enter_context(ViewerProcess(window=not given.web))
-        if given.web:
-            page = stack.enter_context(WebPage(given.port, viewer.web_port, viewer.url))
+        # Its port first: where that is taken, no viewer is started and no second is lost.
+        page = stack.enter_context(WebPage(given.port, viewer.web_port, viewer.url)) if given.web else None
+        sink = new_sink(name, live=given.file is None)
+        stack.enter_context(viewer)
+        if page is not None:
             print(f"{page.url} shows it to browsers of this machine (Ctrl-C ends)", flush=True)
         yield viewer, sink.to_viewer(viewer.url)
 
@@ -148,15 +157,25 @@ def _begun(given: argparse.Namespace) -> Iterator[RawMessage]:
     return chain((first,), raws)
 
 
-def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Painter, show: Showing) -> None:
-    """Draw a recording, and stay with its viewer. Raises McapFileError, CommandError, ViewerError."""
+def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Painter, show: Showing) -> str:
+    """Draw a recording, and stay with its viewer; what is damaged in it, with what came before drawn.
+
+    Raises CommandError, ViewerError.
+    """
+    damage = ""
     with Console(stderr=True).status(f"drawing {given.file}"):
-        paint_all(raws, painter.take, show.stopped)
+        try:
+            paint_all(raws, painter.take, show.stopped)
+        except McapFileError as error:
+            damage = str(error)
+    if damage:
+        print(f"deixis view: {damage}; what comes before that is drawn", file=sys.stderr)
     print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
     if given.out is not None:
         print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
     else:
         show.stay()
+    return damage
 
 
 def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, painter: Painter, show: Showing) -> None:
@@ -174,7 +193,7 @@ def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, paint
                 _compare_clocks(session, given.robot, scene)
     if drawer.failure:
         raise CommandError(f"drawing has failed: {drawer.failure}")
-    if not scene.heard_anything:
+    if not scene.heard_anything and not (show.interrupted and teller.young):
         raise CommandError(f"nothing was heard of robot '{given.robot}' at {given.connect}; see 'deixis doctor'")
 
 
@@ -187,6 +206,11 @@ class _Teller:
         self._since_s = time.monotonic()
         self._told: set[str] = set()
 
+    @property
+    def young(self) -> bool:
+        """Whether it looks on for so short that silence says nothing yet."""
+        return time.monotonic() - self._since_s < SILENT_S
+
     def tell(self) -> None:
         """Say what is missing, once it has been for a while; and each time that the router is gone or back."""
         if bool(self._session.info.routers_zid()) != self._linked:
@@ -194,7 +218,7 @@ class _Teller:
             print(
                 f"deixis view: the router is {'back' if self._linked else 'gone; waiting for it'}", file=sys.stderr, flush=True
             )
-        if time.monotonic() - self._since_s < SILENT_S:
+        if self.young:
             return
         if not self._scene.heard_anything:
             self._say(f"nothing is heard of robot '{self._given.robot}' at {self._given.connect} yet; see 'deixis doctor'")

@@ -12,10 +12,12 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
+
+from .workplace import Workplace
 
 LOOPBACK = "127.0.0.1"
 START_S = 20.0
@@ -34,8 +36,7 @@ class ViewerProcess:
     def __init__(self, *, window: bool) -> None:
         self.port, self.web_port = free_port(), free_port()
         self._window = window
-        self._folder = tempfile.TemporaryDirectory(prefix="deixis-view-")
-        self._log = Path(self._folder.name) / "rerun.log"
+        self._folder: Path
         self._child: subprocess.Popen[bytes]
 
     @property
@@ -50,25 +51,30 @@ class ViewerProcess:
 
     def __enter__(self) -> Self:
         """Start it, and wait until it listens. Raises ViewerError."""
+        with ExitStack() as stack:
+            self._folder = stack.enter_context(Workplace())
+            self._start()
+            stack.callback(self._end)
+            self._await_all()
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def _start(self) -> None:
         argv = [sys.executable, "-m", "deixis_view.viewer_start", str(os.getpid())]
         argv += ["--bind", LOOPBACK, "--port", str(self.port), "--server-memory-limit", MEMORY]
         if self._window:
             argv += ["--memory-limit", MEMORY, "--hide-welcome-screen", "--expect-data-soon"]
         else:
             argv += ["--serve-web", "--web-viewer-port", str(self.web_port)]
-        with self._log.open("ab") as log:
+        with self._log().open("ab") as log:
             self._child = subprocess.Popen(
                 argv, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self._environment(), start_new_session=True
             )
-        try:
-            for port in (self.port,) if self._window else (self.port, self.web_port):
-                self._await(port)
-        except ViewerError:
-            self.__exit__()
-            raise
-        return self
 
-    def __exit__(self, *_: object) -> None:
+    def _end(self) -> None:
         # The whole group: where the kernel cannot end it with us, the package starts its program as a child.
         for number in (signal.SIGTERM, signal.SIGKILL):
             try:
@@ -79,7 +85,6 @@ class ViewerProcess:
             except subprocess.TimeoutExpired:
                 continue
         self._child.wait()
-        self._folder.cleanup()
 
     def closed(self) -> bool:
         """Whether it has ended, as when its window was closed."""
@@ -89,6 +94,10 @@ class ViewerProcess:
         """Why it ended, where that was no end in good order."""
         status = self._child.poll()
         return "" if status in (None, 0) else f"Rerun's viewer has ended with status {status}: {self._last_words()}"
+
+    def _await_all(self) -> None:
+        for port in (self.port,) if self._window else (self.port, self.web_port):
+            self._await(port)
 
     def _await(self, port: int) -> None:
         deadline_s = time.monotonic() + START_S
@@ -105,7 +114,7 @@ class ViewerProcess:
 
     def _environment(self) -> dict[str, str]:
         """Ours, with a configuration in which it reports nothing of its use to its makers; the user's own stays as it is."""
-        folder = Path(self._folder.name)
+        folder = self._folder
         settings = folder / "rerun" / "analytics.json"
         settings.parent.mkdir()
         content = {"analytics_enabled": False, "analytics_id": "none", "metadata": {}}
@@ -113,8 +122,11 @@ class ViewerProcess:
         settings.write_text(json.dumps(content | paths))
         return {**os.environ, "XDG_CONFIG_HOME": str(folder), "NO_COLOR": "1"}
 
+    def _log(self) -> Path:
+        return self._folder / "rerun.log"
+
     def _last_words(self) -> str:
-        lines = self._log.read_text(errors="replace").strip().splitlines()
+        lines = self._log().read_text(errors="replace").strip().splitlines()
         return " ".join(lines[-3:])[-600:] or "it said nothing"
 
 
