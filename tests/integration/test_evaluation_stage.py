@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from refused import refused
 
 DEIXIS = Path(sys.executable).parent / "deixis"
 
@@ -89,8 +90,10 @@ def test_gestures_and_fusion_are_scored_alone_and_a_table_with_an_empty_region_i
         (("--stage", "headpose", "--seeds", "0:1"), 1, "either a folder"),
     ],
 )
-def test_bad_usage_gives_a_clear_error(clips: Path, arguments: tuple[str, ...], status: int, named: str) -> None:
-    done = evaluate(clips, *arguments)
-    assert done.returncode == status
-    assert named in done.stderr
-    assert "Traceback" not in done.stderr
+def test_bad_usage_gives_a_clear_error(
+    clips: Path, arguments: tuple[str, ...], status: int, named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    became, said = refused(capsys, "eval", clips, *arguments)
+    assert became == status
+    assert named in said
+    assert "Traceback" not in said

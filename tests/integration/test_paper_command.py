@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import pytest
+from refused import refused
 
 DEIXIS = Path(sys.executable).parent / "deixis"
 ROWS = {"N", "n_av", "Corm", "Cors", "False", "Vh", "Ch", "Vf", "Cf"}
@@ -98,7 +99,9 @@ def test_a_measured_table_1_changes_what_is_recognised(tmp_path: Path) -> None:
         (("--out", "/proc/nowhere"), 1, "--out /proc/nowhere"),
     ],
 )
-def test_what_cannot_be_is_refused_and_said(arguments: tuple[str, ...], status: int, complaint: str) -> None:
-    done = paper("--trials", "10", *arguments)
-    assert done.returncode == status
-    assert complaint in done.stderr
+def test_what_cannot_be_is_refused_and_said(
+    arguments: tuple[str, ...], status: int, complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    became, said = refused(capsys, "paper", "--trials", "10", *arguments)
+    assert became == status
+    assert complaint in said

@@ -15,6 +15,7 @@ from deixis_simulation.rehearsal.ground import ground_of
 from deixis_simulation.rehearsal.performance import Venue, play_trial
 from deixis_simulation.rehearsal.places import given_places
 from deixis_simulation.rehearsal.trials import plan_trials
+from refused import refused
 from running import POINTED_AT, ROOT, SITE
 from simulation_ready import needs_renderer
 
@@ -58,10 +59,10 @@ def test_plan_needs_no_renderer(tmp_path: Path) -> None:
         (("--count", "0"), "'0' is not a whole number from 1 to 50"),
     ],
 )
-def test_what_cannot_be_is_refused(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
-    done = rehearse("--site", SITE, *arguments, cwd=tmp_path)
-    assert done.returncode in (1, 2)
-    assert words in done.stderr
+def test_what_cannot_be_is_refused(arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, complaint = refused(capsys, "rehearse", "--site", SITE, *arguments)
+    assert status in (1, 2)
+    assert words in complaint
 
 
 @needs_renderer

@@ -13,6 +13,7 @@ import yaml
 from deixis_evaluation.clips import load_clips
 from deixis_simulation.draw import draw_scene
 from deixis_simulation.scene import Camera, dump_scene
+from refused import refused
 from simulation_ready import needs_renderer
 
 DEIXIS = Path(sys.executable).parent / "deixis"
@@ -53,13 +54,13 @@ def test_dry_run_writes_scenes_that_can_be_read(tmp_path):
     assert shown.stdout == (tmp_path / "s0004_000_turn.yaml").read_text()
 
 
-def test_plain_scenes_have_names_of_their_own(tmp_path):
+def test_plain_scenes_have_names_of_their_own(tmp_path, capsys):
     done = simulate("--dry-run", "--plain", "--count", 2, "--seed", 4, "--kinds", "turn", "--out", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p0004_000_turn.yaml", "p0004_001_turn.yaml"]
-    wide = simulate("--dry-run", "--plain", "--size", "1280x720")
-    assert wide.returncode == 1
-    assert "4:3" in wide.stderr
+    status, complaint = refused(capsys, "simulate", "--dry-run", "--plain", "--size", "1280x720")
+    assert status == 1
+    assert "4:3" in complaint
 
 
 @pytest.mark.parametrize(
@@ -74,32 +75,32 @@ def test_plain_scenes_have_names_of_their_own(tmp_path):
         (("--jobs", "many"), "not a whole number"),
     ],
 )
-def test_bad_options_are_usage_errors(arguments, said):
-    done = simulate(*arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
+def test_bad_options_are_usage_errors(arguments, said, capsys):
+    status, complaint = refused(capsys, "simulate", *arguments)
+    assert status == 2
+    assert said in complaint
 
 
-def test_rendering_needs_a_folder():
-    done = simulate("--count", 1)
-    assert done.returncode == 1
-    assert "--out" in done.stderr
+def test_rendering_needs_a_folder(capsys):
+    status, complaint = refused(capsys, "simulate", "--count", 1)
+    assert status == 1
+    assert "--out" in complaint
 
 
-def test_a_bad_scene_names_its_field(tmp_path):
+def test_a_bad_scene_names_its_field(tmp_path, capsys):
     content = yaml.safe_load(dump_scene(draw_scene(1, 0, ("point",))))
     content["people"][0]["place"] = [1, 2]
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump(content))
-    done = simulate("--scene", tmp_path / "bad.yaml", "--out", tmp_path)
-    assert done.returncode == 1
-    assert "people.0.place" in done.stderr
-    assert "bad.yaml" in done.stderr
+    status, complaint = refused(capsys, "simulate", "--scene", tmp_path / "bad.yaml", "--out", tmp_path)
+    assert status == 1
+    assert "people.0.place" in complaint
+    assert "bad.yaml" in complaint
 
 
-def test_a_scene_that_is_not_there(tmp_path):
-    done = simulate("--scene", tmp_path / "none.yaml", "--out", tmp_path)
-    assert done.returncode == 1
-    assert "cannot be read" in done.stderr
+def test_a_scene_that_is_not_there(tmp_path, capsys):
+    status, complaint = refused(capsys, "simulate", "--scene", tmp_path / "none.yaml", "--out", tmp_path)
+    assert status == 1
+    assert "cannot be read" in complaint
 
 
 @needs_renderer
