@@ -30,7 +30,7 @@ def settle() -> None:
 def let_go_of_libraries() -> None:
     """For a process that did imports for others and does no more: its pages of libraries, 11 MB.
 
-    Those that are needed again come back from the system's cache as they are. In a stage that costs more than it saves.
+    Those that are needed again come back from the system's cache as they are. In the stages it saves no more.
     """
     advise = getattr(ctypes.CDLL(None), "madvise", None)
     if advise is None:
