@@ -193,6 +193,28 @@ def heard_again(host, unit, signal, heard):
     return round(float(heard_s) - at_s, 2), round(started_s - at_s, 2)
 
 
+@pytest.mark.parametrize("signal", ["KILL", "STOP"])
+def test_a_watchman_that_is_gone_or_hangs_harms_nobody_and_the_next_one_finds_who_hangs(host, signal):
+    others = [unit for unit in UNITS if unit != WATCHMAN]
+    before, watchman = {unit: main_pid(host, unit) for unit in others}, main_pid(host, WATCHMAN)
+    gesture = "deixis@gesture.service"
+    host.run(["systemctl", "reset-failed", gesture])
+    send(host, signal, WATCHMAN)
+    wait_until(lambda: main_pid(host, WATCHMAN) not in (0, watchman), "another watchman", PATIENCE_S, host.log)
+    assert {unit: main_pid(host, unit) for unit in others} == before
+    wait_until(lambda: hears_of(host, gesture), "it hears of gesture", PATIENCE_S, host.log)
+    send(host, "STOP", gesture)
+    wait_until(lambda: main_pid(host, gesture) not in (0, before[gesture]), "gesture is again", PATIENCE_S, host.log)
+    said = f"deixis-gesture (process {before[gesture]}) gave no sign that its loop runs for 0.8 s; killed"
+    assert said in host.log.read_text()
+
+
+def hears_of(host, unit):
+    """Whether the watchman holds a handle on the unit's process: it does from the first sign on."""
+    held = host.run(["sh", "-c", f"cat /proc/{main_pid(host, WATCHMAN)}/fdinfo/*"], check=False).stdout
+    return f"Pid:\t{main_pid(host, unit)}\n" in held
+
+
 def wait_for_an_answer(host):
     """Wait for a final answer that comes from now on, and is right."""
     argv = ["deixis", "watch", "--json", "--robot", ROBOT, "--connect", SOCKET, "--seconds", PATIENCE_S]
