@@ -186,7 +186,11 @@ EXCEPTIONS = (
     (r"python3\.11 -m venv zenoh-cli.*|zenoh-cli/bin/pip .*", "needs a package index; test_zenoh_cli makes this environment"),
     (r".*bin/pip install .*", "needs a package index, and torch or belief libraries are large"),
     (r".*python (bench|fitting)/.*", MINUTES),
-    (r".*deixis eval .*", MINUTES),
+    (
+        r".*deixis eval .*examples/clips.*",
+        "scores all shipped clips, a minute on a busy machine; test_evaluation_command and test_evaluation_stage score some",
+    ),
+    (r".*deixis eval (?!.*examples/clips).*", MINUTES),
     (r".*deixis rehearse --site my_site\.yaml", f"{MINUTES}; with --plan it is run"),
     (r".*deixis simulate .*", MINUTES),
     (r"make references", MINUTES),

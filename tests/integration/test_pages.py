@@ -293,3 +293,20 @@ def test_most_commands_are_run():
 @pytest.mark.parametrize(("page", "test"), WORD_FOR_WORD.items())
 def test_a_page_that_is_left_out_has_a_test_that_runs_it(page, test):
     assert f'"{page.split("/")[1]}"' in (ROOT / "tests" / "integration" / f"{test}.py").read_text()
+
+
+@pytest.mark.parametrize("why", [why for _, why in EXCEPTIONS if "test_" in why])
+def test_a_test_that_is_said_to_run_something_is_there(why):
+    names = {path.stem for path in (ROOT / "tests").rglob("test_*.py")}
+    assert set(re.findall(r"test_\w+", why)) <= names
+
+
+SCRIPTS = [one for one in ALL if re.search(r"python (bench|fitting)/", one.line)]
+
+
+@pytest.mark.parametrize("one", SCRIPTS, ids=str)
+def test_a_script_that_takes_hours_is_there_and_knows_its_options(one):
+    _, script, *arguments = one.line.split()
+    text = (ROOT / script).read_text()
+    unknown = [word for word in arguments if word.startswith("--") and f'"{word}"' not in text]
+    assert not unknown
