@@ -20,6 +20,7 @@ SHARED = ROOT.parent / "shared"
 LONGEST_FIRST = (
     "test_gesture_rust.py",
     "test_compose.py",
+    "test_pages.py",
     "test_rehearsal.py",
     "test_view.py",
     "test_two_hosts.py",

@@ -8,6 +8,7 @@ import deixis_cli
 import deixis_runtime
 import pytest
 from deixis_cli import main as command_line
+from deixis_cli import overview
 
 COMMANDS = {"run", "up", "status", "watch", "certs", "doctor", "poi", "record", "replay", "swap"}
 
@@ -30,7 +31,7 @@ def test_a_command_of_another_distribution_is_found_by_its_entry_point(monkeypat
         parser.add_argument("--status", type=int)
         parser.set_defaults(run=lambda given: given.status)
 
-    monkeypatch.setattr(command_line, "entry_points", lambda **_: [entry("hello", register)])
+    monkeypatch.setattr(overview, "entry_points", lambda **_: [entry("hello", register)])
     assert command_line.main(["hello", "--status", "7"]) == 7
 
 
@@ -42,7 +43,7 @@ def test_a_command_that_cannot_be_loaded_is_said_and_leaves_the_others(monkeypat
         subparsers.add_parser("hello").set_defaults(run=lambda _: 0)
 
     entries = [SimpleNamespace(name="broken", load=broken), entry("hello", register)]
-    monkeypatch.setattr(command_line, "entry_points", lambda **_: entries)
+    monkeypatch.setattr(overview, "entry_points", lambda **_: entries)
     assert command_line.main(["hello"]) == 0
     with pytest.raises(SystemExit) as left:
         command_line.main(["broken"])

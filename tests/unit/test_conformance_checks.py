@@ -327,3 +327,13 @@ def test_a_stage_that_was_not_seen_at_work_is_not_said_to_keep_the_contract(outc
     print_report("gesture", results, 1.0)
     assert f"gesture: {verdict} (" in capsys.readouterr().out
     assert unseen(results) == (outcome == "skipped")
+
+
+def test_a_frame_that_was_on_its_way_when_the_look_began_is_no_stranger_but_one_of_another_run_is():
+    def looked(*others):
+        fed = [Fed(FrameId(1, seq), 1_000 + seq, seq * 0.1) for seq in range(4, 14)]
+        return Phase("watched", 0.4, 2.0, fed, [*others, *(answer(seq, seq * 0.1 + 0.02) for seq in range(4, 14))], True)
+
+    assert outcomes(check_answers("gesture", looked(answer(3, 0.41))))["frame"] == "passed"
+    for stranger in (answer(3, 0.41, run=2), answer(14, 0.41)):
+        assert outcomes(check_answers("gesture", looked(stranger)))["frame"] == "failed"

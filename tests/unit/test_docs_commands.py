@@ -5,15 +5,9 @@ import shlex
 
 import pytest
 from deixis_cli.main import parser
+from page_commands import PAGES, SHELL, blocks
 from running import ROOT
 
-PAGES = [
-    ROOT / "README.md",
-    *sorted((ROOT / "docs").glob("*.md")),
-    *sorted(ROOT.glob("*/README.md")),
-    *ROOT.glob("*/*/README.md"),
-]
-BLOCK = re.compile(r"^[ ]*```(?:sh|bash|)\n(.*?)^[ ]*```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`((?:\.venv/bin/)?deixis [a-z][^`]*)`")
 NAMES = {"deixis", ".venv/bin/deixis"}
 # What a reader is to put in, and what stands for "and so on".
@@ -23,11 +17,10 @@ ENDS = {"&", "&&", "||", ";", ">", "2>", "#", "do"}
 
 def commands_on(page):
     """Each command with its words, as a shell would read them, and whether it stands in a sentence."""
-    text = page.read_text()
-    for block in BLOCK.findall(text):
+    for block in (text for language, text in blocks(page) if language == SHELL):
         for line in re.sub(r"\\\n\s*", " ", block).splitlines():
             yield from ((False, words) for words in commands_in(line))
-    for inline in INLINE.findall(text):
+    for inline in INLINE.findall(page.read_text()):
         yield from ((True, words) for words in commands_in(" ".join(inline.split())))
 
 
