@@ -234,7 +234,7 @@ def test_a_viewer_that_is_stopped_is_left_out_and_takes_part_again_when_it_goes_
 def test_the_viewer_ends_with_a_command_that_is_killed(run, tmp_path):
     log = tmp_path / "log"
     with process(command("deixis", "view", run / "pointing.mcap", "--web", "--port", 0), log) as child:
-        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", 60.0, log)
+        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", LOADED_S, log)
         (viewer,) = children(child.pid)
         child.kill()
     wait_until(lambda: not alive(viewer), "the viewer is gone", 10.0)
@@ -309,7 +309,7 @@ def test_a_view_that_is_killed_leaves_no_folder_or_the_next_removes_it(run, tmp_
 
     started, log = looked_at()
     with started as child:
-        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", 60.0, log)
+        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", LOADED_S, log)
         (left,) = folders()
         child.send_signal(number)
         child.wait(30)
@@ -318,7 +318,7 @@ def test_a_view_that_is_killed_leaves_no_folder_or_the_next_removes_it(run, tmp_
         os.utime(left, (0, 0))  # one that was just made is let alone
     started, log = looked_at()
     with started:
-        wait_until(lambda: "shows it to browsers" in log.read_text(), "the page's address", 60.0, log)
+        wait_until(lambda: "shows it to browsers" in log.read_text(), "the page's address", LOADED_S, log)
         (used,) = folders()
         assert used != left
         os.utime(used, (0, 0))
