@@ -22,7 +22,7 @@ ENV PYTHONUNBUFFERED=1 \
 # version, say the distributions and constraints.txt; pip below adds whatever is missing here.
 COPY constraints.txt /tmp/constraints.txt
 RUN pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
-    cryptography eclipse-zenoh msgpack numpy "opencv-python-headless<5" pydantic pyyaml rich setproctitle
+    cryptography eclipse-zenoh mcap msgpack numpy "opencv-python-headless<5" pydantic pyyaml rich setproctitle
 COPY --from=wheels /wheels /wheels
 RUN pip install --quiet --no-cache-dir --root-user-action ignore -c /tmp/constraints.txt \
     /wheels/deixis_schemas-*.whl "$(echo /wheels/deixis_runtime-*.whl)[images]" /wheels/deixis_cli-*.whl
