@@ -89,7 +89,7 @@ def test_pauses_between_retries_double_up_to_the_longest_and_start_anew_after_a_
 def test_lockstep_feeds_the_next_frame_when_fusion_has_answered_the_last() -> None:
     lockstep = Lockstep(2.0)
     assert lockstep.may_feed(0.0)
-    lockstep.sent(FrameId(123, 7), 0.0)
+    lockstep.sent(FrameId(123, 7), 0, 0.0)
     assert not lockstep.may_feed(1.9)
     lockstep.answered(FrameId(99, 7))
     assert not lockstep.may_feed(1.9), "the answer to the frame of that number of another run is not the answer"
@@ -100,10 +100,21 @@ def test_lockstep_feeds_the_next_frame_when_fusion_has_answered_the_last() -> No
 
 def test_lockstep_goes_on_when_no_answer_comes_and_names_the_frame_once() -> None:
     lockstep = Lockstep(2.0)
-    lockstep.sent(FrameId(123, 7), 0.0)
+    lockstep.sent(FrameId(123, 7), 0, 0.0)
     assert lockstep.may_feed(2.0)
     assert lockstep.given_up() == 7
     assert lockstep.given_up() is None
+
+
+def test_a_looped_recording_in_lockstep_is_played_at_its_own_rate_at_most_and_another_as_fast_as_it_is_answered() -> None:
+    looped, to_its_end = Lockstep(2.0, looped=True), Lockstep(2.0)
+    for lockstep in (looped, to_its_end):
+        assert lockstep.early_s(0, 5.0) == 0, "the first one has no time to wait for"
+        lockstep.sent(FrameId(123, 7), 400_000_000, 5.0)
+        lockstep.answered(FrameId(123, 7))
+    assert looped.early_s(500_000_000, 5.03) == pytest.approx(0.07)
+    assert looped.early_s(500_000_000, 5.2) == 0
+    assert to_its_end.early_s(500_000_000, 5.03) == 0
 
 
 def test_the_stages_to_wait_for_are_those_of_the_topic_table() -> None:

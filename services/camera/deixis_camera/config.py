@@ -71,7 +71,9 @@ class CameraConfig(StageConfig):
         default=60.0, ge=10, le=170, description="Horizontal field of view to assume where there is no calibration, degrees."
     )
     mount: Mount = Field(default_factory=Mount, description="Pose of the optical centre in base_link.")
-    loop: bool = Field(default=False, description="Play a file or folder again and again.")
+    loop: bool = Field(
+        default=False, description="Play a file or folder again and again, in lockstep too at its own rate at most."
+    )
     open_timeout_s: float = Field(default=5.0, ge=0.5, le=60, description="Longest wait for a file or stream to open.")
     read_timeout_s: float = Field(
         default=5.0, ge=0.5, le=60, description="Longest wait for the next picture of a stream before it counts as lost."

@@ -90,16 +90,22 @@ class OwnRate:
 
 
 class Lockstep:
-    """Whether the next frame may go out: when fusion has answered the last, so that two runs are equal."""
+    """Whether the next frame may go out: when fusion has answered the last, so that two runs are equal.
 
-    def __init__(self, timeout_s: float) -> None:
+    What is played to its end goes as fast as it is answered. A `looped` recording has no end to hurry for, and all of the
+    machine to take from others: it is played at its own rate at most.
+    """
+
+    def __init__(self, timeout_s: float, looped: bool = False) -> None:
         self._timeout_s = timeout_s
+        self._looped = looped
         self._open: FrameId | None = None
         self._sent_s = 0.0
+        self._media_ns: int | None = None
 
-    def sent(self, frame_id: FrameId, now_s: float) -> None:
-        """The frame was published."""
-        self._open, self._sent_s = frame_id, now_s
+    def sent(self, frame_id: FrameId, media_ns: int, now_s: float) -> None:
+        """The frame of `media_ns`, in the recording's time, was published."""
+        self._open, self._media_ns, self._sent_s = frame_id, media_ns, now_s
 
     def answered(self, frame_id: FrameId) -> None:
         """fusion/belief of this frame came; one of another frame changes nothing."""
@@ -109,6 +115,12 @@ class Lockstep:
     def may_feed(self, now_s: float) -> bool:
         """The last frame is answered, or its time is up."""
         return self._open is None or now_s - self._sent_s >= self._timeout_s
+
+    def early_s(self, media_ns: int, now_s: float) -> float:
+        """How long the frame of `media_ns` is before its time, s; 0 where it is not, or nothing is looped."""
+        if not self._looped or self._media_ns is None:
+            return 0.0
+        return max(0.0, self._sent_s + (media_ns - self._media_ns) / 1e9 - now_s)
 
     def given_up(self) -> int | None:
         """`seq` of a frame whose answer never came, once; call it when `may_feed` says yes."""

@@ -38,7 +38,7 @@ class CameraStage:
         self._status = CameraStatus(node.producer, without_credentials(config.source), config.mount, node.lockstep)
         self.handoff = Handoff()
         self._link = LinkControl(node, config)
-        self._lockstep = Lockstep(config.lockstep_timeout_s)
+        self._lockstep = Lockstep(config.lockstep_timeout_s, config.loop)
         self._live = False
         self._started = False
         self._own_rate = OwnRate(0.0)
@@ -154,6 +154,10 @@ class CameraStage:
         if not self._lockstep.may_feed(now_s):
             self._hold_s = 0.1
             return
+        early_s = self._lockstep.early_s(picture.time_ns, now_s)
+        if early_s > 0:
+            self._hold_s = early_s
+            return
         unanswered = self._lockstep.given_up()
         if unanswered is not None:
             self._node.count("lockstep_unanswered")
@@ -161,7 +165,7 @@ class CameraStage:
             key = topics.BELIEF.key(self._node.robot)
             self._node.warn("lockstep", f"{key}: no answer to frame {unanswered} within {limit:g} s; the next is fed")
         self._publish(picture, LOCKSTEP_EPOCH_NS + picture.time_ns)
-        self._lockstep.sent(FrameId(picture.run, picture.seq), now_s)
+        self._lockstep.sent(FrameId(picture.run, picture.seq), picture.time_ns, now_s)
 
     def _send(self, picture: Ready, stamp_ns: int) -> None:
         """Publish the picture, or drop it where those before it are late: the next one is newer."""
