@@ -69,9 +69,11 @@ rerun: .venv/.rerun
 	@$(PIP) --no-build-isolation -e 'view[rerun]'
 	@touch $@
 
+# Half of the tests' time is waiting, so that two processors have time for more than two files at once.
+WORKERS ?= 3
 test: setup check
-	@# Two at a time; a file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
-	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+	@# A file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
+	@$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 check: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/mypy $(PACKAGES) $(foreach g,$(MEDIAPIPE),guests/$(g)/deixis_$(g))

@@ -16,28 +16,38 @@ ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"
 
 
-# Two workers take file by file: one that takes minutes must not be the last. These begin, by how long they took.
+# Workers take file by file: one that takes minutes must not be the last. These begin, by how long they took; the first one
+# builds a crate where it was not built before.
 LONGEST_FIRST = (
     "test_gesture_rust.py",
     "test_compose.py",
     "test_pages.py",
-    "test_rehearsal.py",
+    "test_zenoh_cli.py",
+    "test_simulation_command.py",
+    "test_supervision_faults.py",
+    "test_supervision_stages.py",
+    "test_cli_system.py",
+    "test_check_stage.py",
     "test_view.py",
     "test_two_hosts.py",
     "test_link.py",
-    "test_supervision_faults.py",
+    "test_rehearsal.py",
     "test_access.py",
     "test_systemd.py",
+    "test_evaluation_stage.py",
     "test_garbage.py",
-    "test_zenoh_cli.py",
+    "test_record_replay.py",
+    "test_tutorial.py",
     "test_skewed_clock.py",
-    "test_supervision_stages.py",
     "test_zenohd.py",
     "test_camera_process.py",
-    "test_cli_system.py",
-    "test_registry_service.py",
-    "test_ros2.py",
     "test_guests_mediapipe.py",
+    "test_hot_swap.py",
+    "test_paper_command.py",
+    "test_registry_service.py",
+    "test_hot_swap_faults.py",
+    "test_ros2.py",
+    "test_poi_edit.py",
 )
 
 

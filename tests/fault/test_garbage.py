@@ -12,7 +12,7 @@ import zenoh
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import CameraInfo, Frame, Producer, Tracks
 from deixis_schemas.topics import By
-from running import POINTED_AT, system
+from running import SMALL_POINTED_AT, system
 
 ROBOT = "garbage-test"
 HEARD_BY = {  # the keys that stages listen to, and one stage that hears each
@@ -177,6 +177,6 @@ def test_afterwards_all_stages_still_run_and_the_poi_is_named(running):
 
     def named_anew():
         fresh = [target for target in running.state()["recent_targets"] if target["episode_id"] not in known]
-        return any(target["poi_ids"] == [POINTED_AT] for target in fresh)
+        return any(target["poi_ids"] == [SMALL_POINTED_AT] for target in fresh)
 
-    running.wait_until(named_anew, f"{POINTED_AT} named again", 120)
+    running.wait_until(named_anew, f"{SMALL_POINTED_AT} named again", 120)

@@ -20,7 +20,18 @@ from deixis_runtime.session import open_client
 from deixis_schemas import codec, topics
 from deixis_schemas.messages import Gestures, Target
 from private_shm import PrivateShm, missing_for_private_shm
-from running import CLIP, POINTED_AT, SITE, answers, child_called, children, command, free_port, process, wait_until
+from running import (
+    SITE,
+    SMALL_CLIP,
+    SMALL_POINTED_AT,
+    answers,
+    child_called,
+    children,
+    command,
+    free_port,
+    process,
+    wait_until,
+)
 
 pytestmark = pytest.mark.skipif(bool(missing_for_private_shm()), reason=missing_for_private_shm())
 
@@ -95,15 +106,15 @@ class Running:
         """Until a pointing is answered rightly that ends from now on."""
         with self._lock:
             self.targets.clear()
-        self.wait(lambda: [POINTED_AT] in self.targets, "the answer")
+        self.wait(lambda: [SMALL_POINTED_AT] in self.targets, "the answer")
 
 
 @contextmanager
 def running(folder, robot, place, *more):
-    """`deixis up` of all stages on the example, again and again; entered when gestures come."""
+    """`deixis up` of all stages on the small clip, again and again; entered when gestures come."""
     endpoint, log = f"tcp/127.0.0.1:{free_port()}", folder / "log"
     options = ["--robot", robot, "--listen", endpoint, "--site", SITE, "--registry", folder / "pois.sqlite"]
-    argv = command("deixis", "up", *options, "--set", f"camera.source={CLIP}", "--set", "camera.loop=true", *more)
+    argv = command("deixis", "up", *options, "--set", f"camera.source={SMALL_CLIP}", "--set", "camera.loop=true", *more)
     with process(place.command(argv), log) as child:
         wait_until(lambda: child.poll() is not None or answers(endpoint), "a router", 30, log)
         with open_client(endpoint, shared_memory=False) as session:

@@ -19,7 +19,7 @@ STAGES = ["camera", "tracker", "headpose", "gesture", "fusion"]
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    """The example clip played again and again through all stages."""
+    """The small clip played again and again through all stages."""
     with system(tmp_path_factory.mktemp("system"), ROBOT) as it:
         it.wait_until(lambda: it.state().get("last_seq", -1) > 0, "answers", 60)
         yield it

@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import POINTED_AT, ROOT, command, process, system, wait_until
+from running import CLIP, POINTED_AT, ROOT, command, process, system, wait_until
 
 CRATE = ROOT / "guests" / "gesture_rust"
 # The build takes a minute or two, and each clean checkout would begin anew.
@@ -55,7 +55,7 @@ def test_its_own_tests_pass():
 
 def test_an_answer_rests_on_its_evidence(tmp_path, robot, guest):
     with (
-        system(tmp_path, robot, "--except", "gesture") as running,
+        system(tmp_path, robot, "--except", "gesture", clip=CLIP) as running,
         process([guest, "--robot", robot, "--connect", running.endpoint], tmp_path / "guest"),
     ):
 

@@ -14,7 +14,7 @@ SWAP = ROOT / "examples" / "swap_headpose.py"
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    """The example clip through all stages, again and again, in lockstep: a busy machine drops no frame."""
+    """The small clip through all stages, again and again, in lockstep: a busy machine drops no frame."""
     with system(tmp_path_factory.mktemp("swap"), "test-hot-swap") as it:
         it.wait_until(lambda: it.state().get("last_seq", -1) > 0, "frames to be answered", 60)
         yield it

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from deixis_cli.mcap_file import McapReader
 from deixis_schemas import topics
-from running import CLIP, POINTED_AT, SITE, command, free_port, system
+from running import SITE, SMALL_CLIP, SMALL_POINTED_AT, command, free_port, system
 
 ALL_BUT_FUSION = "camera,tracker,headpose,gesture"
 
@@ -32,11 +32,11 @@ def played(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """The example clip, played once: (its recording, what was published)."""
+    """The small clip, played once: (its recording, what was published)."""
     folder = tmp_path_factory.mktemp("run")
-    answers, published = played(folder, "run", CLIP, "--site", SITE, "--pictures")
-    assert [target["poi_ids"] for target in answers["answers"]] == [[POINTED_AT]]
-    return folder / f"{CLIP.stem}.mcap", published
+    answers, published = played(folder, "run", SMALL_CLIP, "--site", SITE, "--pictures")
+    assert [target["poi_ids"] for target in answers["answers"]] == [[SMALL_POINTED_AT]]
+    return folder / f"{SMALL_CLIP.stem}.mcap", published
 
 
 @pytest.mark.parametrize("spoken_for", ["camera", ALL_BUT_FUSION])
@@ -49,7 +49,7 @@ def test_the_same_recording_gives_the_same_outputs_whichever_stages_it_speaks_fo
 def test_at_its_own_rate_a_recording_is_answered_like_the_camera_that_it_was(tmp_path, run, robot):
     registry = tmp_path / "pois.sqlite"
     done = deixis(
-        *("replay", run[0], "--site", SITE, "--robot", robot, "--as", ALL_BUT_FUSION, "--expect", POINTED_AT, "--json"),
+        *("replay", run[0], "--site", SITE, "--robot", robot, "--as", ALL_BUT_FUSION, "--expect", SMALL_POINTED_AT, "--json"),
         *("--listen", f"tcp/127.0.0.1:{free_port()}", "--registry", registry),
     )
     assert done.returncode == 0, done.stderr
@@ -69,7 +69,8 @@ def test_a_running_system_is_recorded_with_what_was_said_before_and_with_picture
             heard = {topics.topic_of(message.key) for message in messages}
             assert {topics.CAMERA_INFO, topics.POI, topics.TRACKS, topics.BELIEF, topics.HEALTH} <= heard
             assert (topics.FRAME in heard) == pictures
-            assert {message.key for message in messages if message.key.endswith(POINTED_AT)}, "the POIs were there before us"
+            of_the_poi = {message.key for message in messages if message.key.endswith(SMALL_POINTED_AT)}
+            assert of_the_poi, "the POIs were there before us"
         again = deixis("record", path, "--robot", robot, "--connect", running.endpoint, "--seconds", "1")
         assert again.returncode == 1
         assert "exists already" in again.stderr

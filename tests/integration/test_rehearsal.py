@@ -22,7 +22,7 @@ from simulation_ready import needs_renderer
 DEIXIS = Path(sys.executable).parent / "deixis"
 ROOM = {
     "name": "a tiny room",
-    "camera": {"source": "0", "rate_hz": 15, "loop": True, "horizontal_fov_deg": 70, "width": 320, "height": 240},
+    "camera": {"source": "0", "rate_hz": 10, "loop": True, "horizontal_fov_deg": 70, "width": 160, "height": 120},
     "pois": [{"poi_id": "lamp", "name": "the lamp", "position_m": [1.6, 1.8, 1.2]}],
 }
 

@@ -50,7 +50,7 @@ def program(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    """The example clip played again and again through all stages."""
+    """The small clip played again and again through all stages."""
     with system(tmp_path_factory.mktemp("system"), ROBOT) as it:
         it.wait_until(lambda: it.state().get("recent_targets"), "an answer", 60)
         yield it
@@ -92,12 +92,12 @@ class TestGetting:
 
         return run
 
-    def test_state_says_what_fusion_knows_and_who_told_it(self, get):
+    def test_state_says_what_fusion_knows_and_who_told_it(self, get, running):
         (state,) = get("fusion/state")
         assert state["robot"] == ROBOT
         producers = {source["stage"]: source["producers"] for source in state["sources"]}
         assert {stage: producers[stage] for stage in ("tracker", "headpose", "gesture")} == {
-            stage: [f"{stage}/lockstep"] for stage in ("tracker", "headpose", "gesture")
+            stage: [f"{stage}/{running.health(stage)['instance']}"] for stage in ("tracker", "headpose", "gesture")
         }
         assert state["recent_targets"][0]["final"] is True
 
@@ -106,8 +106,8 @@ class TestGetting:
 
     def test_camera_info_has_the_calibration(self, get):
         (info,) = get("camera/info")
-        assert (info["width"], info["height"], info["state"]) == (640, 480, "streaming")
-        assert info["camera_matrix"][0] == 560.0
+        assert (info["width"], info["height"], info["state"]) == (320, 240, "streaming")
+        assert info["camera_matrix"][0] == 280.0
 
     def test_health_of_every_stage_comes_with_one_get(self, get):
         healths = get("*/health")
@@ -192,5 +192,5 @@ def test_frames_and_tracks_are_printed_without_their_images(argv, running):
     finally:
         watching.kill()
         watching.communicate()
-    assert seen["camera"]["data"] == "<921600 bytes left out>"
-    assert seen["tracker"]["width"] == 640
+    assert seen["camera"]["data"] == "<230400 bytes left out>"
+    assert seen["tracker"]["width"] == 320
