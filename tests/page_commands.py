@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deixis_cli.main import parser
+from own_environment import own_environment
 from running import ROOT
 
 PAGES = [
@@ -78,7 +79,7 @@ def _is_whole(line: str) -> bool:
     if not any(word.startswith("-") or "." in word for word in arguments):
         return False
     try:
-        with contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.redirect_stderr(io.StringIO()), own_environment():
             parser(name).parse_args([name, *arguments])
     except SystemExit:
         return False

@@ -51,12 +51,17 @@ def test_a_command_that_cannot_be_loaded_is_said_and_leaves_the_others(monkeypat
     assert "'broken' is not available: no module named cv2" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["status", "watch", "doctor", "up", "poi list"])
+@pytest.mark.parametrize("command", ["status", "watch", "up", "poi list"])
 def test_the_robot_has_to_be_named(command, capsys):
     with pytest.raises(SystemExit) as left:
         command_line.main(command.split())
     assert left.value.code == 2
     assert "--robot" in capsys.readouterr().err
+
+
+def test_the_robot_has_to_be_named_unless_this_machine_alone_is_examined(capsys):
+    assert command_line.main(["doctor"]) == 1
+    assert "--robot NAME is needed to look at a running system; --local looks at this machine alone" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import shlex
 
 import pytest
 from deixis_cli.main import parser
+from own_environment import own_environment
 from page_commands import PAGES, SHELL, blocks
 from running import ROOT
 
@@ -75,7 +76,8 @@ def test_a_command_of_a_page_is_understood(found, capsys):
 def refusal(name, arguments, capsys):
     """What is wrong with a command line; empty where it is understood."""
     try:
-        parser(name).parse_args([name, *arguments])
+        with own_environment():
+            parser(name).parse_args([name, *arguments])
     except SystemExit as error:
         return capsys.readouterr().err if error.code else ""
     return ""
