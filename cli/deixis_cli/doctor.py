@@ -49,9 +49,9 @@ def register(subparsers: Any) -> None:
         "--camera",
         nargs="?",
         type=Path,
-        const=Path("camera.png"),
+        const=Path("doctor.png"),
         metavar="FILE.png",
-        help="look through the robot's camera, or --source, and draw what the tracker sees (default: camera.png; written over)",
+        help="look through the robot's camera, or --source, and draw what the tracker sees (default: doctor.png; written over)",
     )
     parser.set_defaults(run=run)
 
