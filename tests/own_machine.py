@@ -11,7 +11,8 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+
+from namespace_holder import NamespaceHolder
 
 NEW = ("unshare", "--net", "--mount")
 AS_ROOT_THERE = ("--user", "--map-root-user")
@@ -38,30 +39,16 @@ def missing_for_own_machine() -> str:
     return f"a machine of one's own needs namespaces: {tried.stderr.strip()}" if tried.returncode else ""
 
 
-class OwnMachine:
+class OwnMachine(NamespaceHolder):
     """Use as a context manager. names: of hosts, all of which it is."""
 
     def __init__(self, folder: Path, names: Sequence[str]) -> None:
-        self._hosts = folder / "hosts"
-        self._hosts.write_text(f"127.0.0.1 localhost {' '.join(names)}\n")
-        self._holder: subprocess.Popen[str]
-
-    def __enter__(self) -> Self:
-        argv = [*NEW, *_options(), "sh", "-c", MAKE, str(self._hosts)]
-        self._holder = subprocess.Popen(argv, stdout=subprocess.PIPE, text=True)
-        assert self._holder.stdout is not None
-        if self._holder.stdout.readline().strip() != "up":
-            raise RuntimeError("a machine of one's own cannot be made")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._holder.kill()
-        self._holder.wait()
-        assert self._holder.stdout is not None
-        self._holder.stdout.close()
+        hosts = folder / "hosts"
+        hosts.write_text(f"127.0.0.1 localhost {' '.join(names)}\n")
+        super().__init__([*NEW, *_options(), "sh", "-c", MAKE, str(hosts)], "a machine of one's own")
 
     def argv(self, folder: Path, script: str) -> list[str]:
         """How to start a script of bash there, in a folder."""
         user = ["--user", "--preserve-credentials"] if os.geteuid() else []
-        inside = ["nsenter", "--target", str(self._holder.pid), "--net", "--mount", *user, f"--wd={folder}"]
+        inside = ["nsenter", "--target", str(self.pid), "--net", "--mount", *user, f"--wd={folder}"]
         return [*inside, "bash", "-c", script]

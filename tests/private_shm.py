@@ -10,7 +10,8 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+
+from namespace_holder import NamespaceHolder
 
 
 def missing_for_private_shm() -> str:
@@ -24,36 +25,23 @@ def missing_for_private_shm() -> str:
     return f"a private /dev/shm needs a mount namespace: {tried.stderr.strip()}" if tried.returncode else ""
 
 
-class PrivateShm:
+class PrivateShm(NamespaceHolder):
     """Use as a context manager. A command of `command` is the process that it names, and not a child of one."""
 
     def __init__(self, folder: Path) -> None:
         self.temporary = folder / "tmp"
-        self._holder: subprocess.Popen[str]
-
-    def __enter__(self) -> Self:
         self.temporary.mkdir()
         script = "mount -t tmpfs tmpfs /dev/shm && echo up && exec sleep infinity"
-        self._holder = subprocess.Popen(["unshare", "-m", "sh", "-c", script], stdout=subprocess.PIPE, text=True)
-        assert self._holder.stdout is not None
-        if self._holder.stdout.readline().strip() != "up":
-            raise RuntimeError("a private /dev/shm cannot be made")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._holder.kill()
-        self._holder.wait()
-        assert self._holder.stdout is not None
-        self._holder.stdout.close()
+        super().__init__(["unshare", "-m", "sh", "-c", script], "a private /dev/shm")
 
     def command(self, argv: Sequence[object]) -> list[str]:
         """`argv` as it has to be started to run there."""
-        inside = ["nsenter", "-t", str(self._holder.pid), "-m"]
+        inside = ["nsenter", "-t", str(self.pid), "-m"]
         return [*inside, "env", f"TMPDIR={self.temporary}", *map(str, argv)]
 
     def shared_memory(self) -> set[str]:
         """Names of the files in its /dev/shm."""
-        return set(os.listdir(f"/proc/{self._holder.pid}/root/dev/shm"))
+        return set(os.listdir(f"/proc/{self.pid}/root/dev/shm"))
 
     def temporary_files(self) -> set[str]:
         """Names of the files and folders in its temporary folder."""
