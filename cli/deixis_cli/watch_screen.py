@@ -53,7 +53,7 @@ class WatchScreen:
         self._live.__exit__(kind, error, trace)
 
     def hear(self, message: Message) -> None:
-        """Take in one message; a final target becomes a line that stays."""
+        """Take in one message; a final target becomes a text that stays."""
         self._summary.hear(message)
         if isinstance(message, OfFrame):
             self._spoke_s[message.stage] = self._clock()
@@ -62,8 +62,8 @@ class WatchScreen:
         elif isinstance(message, Health):
             self._health[message.stage] = (message, self._clock())
         elif isinstance(message, Target) and message.final:
-            line = episode_line(message, self._summary.names)
-            self._live.console.print(line, no_wrap=True, overflow="ellipsis")
+            # Whole, over several lines of a narrow terminal: it is what is left to scroll back to.
+            self._live.console.print(episode_line(message, self._summary.names))
 
     def picture(self) -> RenderableType:
         """All that is redrawn."""
