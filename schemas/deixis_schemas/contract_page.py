@@ -13,7 +13,7 @@ INTRODUCTION = """# The contract
 
 Written by `make contract` from `schemas/deixis_schemas`; edit that. What a stage in any language has to know: keys,
 types, rates, ages, and what silence means. Whether it keeps to it says `deixis check-stage` ([write your own
-stage](swap.md)).
+stage](write-your-own-stage.md)).
 
 ## On the wire
 

@@ -203,7 +203,7 @@ class Track(Part):
     """One tracked skin-coloured blob. Left and right are the person's own."""
 
     track_id: Count
-    person_id: int | None = Field(default=None, ge=0, description="Person it belongs to; none where that is open.")
+    person_id: Count | None = Field(default=None, description="Person it belongs to; none where that is open.")
     kind: TrackKind
     kind_probabilities: KindProbabilities
     centroid_px: Point

@@ -61,3 +61,20 @@ def test_golden_json_fits_its_schema(sample):
     document = json.loads((FOLDER / f"{name}.golden.json").read_bytes())
     jsonschema.validate(document, schema)
     assert codec.decode_json(type(sample), json.dumps(document)) == sample
+
+
+def unbounded(schema: object, path: str = "") -> list[str]:
+    """Paths of the whole numbers that a schema leaves without a bound."""
+    if isinstance(schema, dict):
+        loose = schema.get("type") == "integer" and not {"minimum", "maximum"} <= schema.keys()
+        inside = [found for name, part in schema.items() for found in unbounded(part, f"{path}/{name}")]
+        return [path] * loose + inside
+    if isinstance(schema, list):
+        return [found for place, part in enumerate(schema) for found in unbounded(part, f"{path}/{place}")]
+    return []
+
+
+def test_no_whole_number_is_without_bounds():
+    """A person_id beyond 2^63, which the schema of tracks allowed and those of gestures and beliefs did not, ended both stages."""
+    for path in sorted(FOLDER.glob("*.schema.json")):
+        assert unbounded(json.loads(path.read_text())) == [], path.name
