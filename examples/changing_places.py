@@ -25,9 +25,9 @@ class Place:
 
     def is_ours(self, frame):
         """Whether the answer to this frame is to be heard. To be asked once for each, in the order of their coming."""
-        self.newest = frame
-        begun = self.first is not None and self._order(self.first) <= self._order(frame)
-        return begun and (self.end is None or self._order(frame) < self._order(self.end))
+        self.newest, now = frame, self._order(frame)
+        begun = self.first is not None and self._order(self.first) <= now
+        return begun and (self.end is None or now < self._order(self.end))
 
     def answer_questions(self):
         """Do what is asked of us: `take` a place, `yield` ours, `leave`; each is answered with how we stand then."""

@@ -290,3 +290,21 @@ def test_it_leaves_only_when_the_newcomer_has_the_place_and_after_a_while_by_its
     assert old.must_stay(0.1) == ""
     assert not old.is_to_leave(LEAVE_AFTER_S)
     assert old.is_to_leave(LEAVE_AFTER_S + 0.2)
+
+
+def test_a_frame_ahead_is_named_also_when_the_run_in_which_the_place_was_taken_is_long_forgotten():
+    """A place that was taken 17 loops of a clip ago was given on with the frame of then: both answered until the next loop."""
+    voice = Voice(standing_by=True)
+    voice.answers(FrameId(1, 0), 0.0)
+    voice.ask("old", 0.0)
+    assert voice.take(FrameId(1, 10), 0.1)
+    now_s = 1.0
+    for run in range(1, 40):
+        for seq in range(20):
+            voice.answers(FrameId(run, seq), now_s)
+            now_s += 0.03
+    fence = voice.yield_to("new", now_s)
+    assert fence == FrameId(39, 20 + LEAD_FRAMES)
+    assert voice.answers(FrameId(39, 20), now_s)
+    assert not voice.answers(FrameId(39, 20 + LEAD_FRAMES), now_s)
+    assert not voice.answers(FrameId(40, 0), now_s)

@@ -53,6 +53,7 @@ impl Place {
     /// Whether the answer to this frame is to be heard. To be asked once for each, in the order of their coming.
     pub fn is_ours(&mut self, frame: Frame) -> bool {
         self.newest = Some(frame);
+        self.order(frame); // also where nothing is compared yet: runs count in the order in which they were met
         self.is_from(self.first, frame) && !self.is_from(self.end, frame)
     }
 
