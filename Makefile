@@ -46,6 +46,7 @@ $(GUESTS)/.installed: guests/constraints.txt constraints.txt $(patsubst %,guests
 # With guests in the place of our stages: make demo LINEUP=mediapipe
 demo: setup $(if $(filter-out classic,$(LINEUP)),guests)
 ifeq ($(SOURCE),)
+	@rm -f $(DEMO_RECORDING)  # what is shown afterwards is this run and none before
 	@registry=$$(mktemp -u --suffix=.sqlite) && $(BIN)/deixis run examples/pointing.mp4 --site examples/pointing.yaml \
 		--registry $$registry --expect P3 --lineup "$(LINEUP)" --out $(dir $(DEMO_RECORDING)); status=$$?; rm -f $$registry*; \
 		[ ! -f $(DEMO_RECORDING) ] || printf '\n%s\n' "To see what it just did: make view (in a window), or make view WEB=1 (in a browser)"; exit $$status

@@ -68,7 +68,10 @@ def open_session(endpoint, within_s):
     """A client session of the router at `endpoint`, which may still be starting; ends the process where none comes in time."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    try:
+        config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    except zenoh.ZError:
+        sys.exit(f"swap_headpose: --connect: '{endpoint}' is no endpoint: tcp/HOST:PORT or unixsock-stream/PATH")
     config.insert_json5("scouting/multicast/enabled", "false")
     until_s, told = time.monotonic() + within_s, False
     while True:
