@@ -15,8 +15,9 @@ from deixis_runtime.host import SOURCE, Host, HostFailed, HostOptions
 from deixis_runtime.interrupts import Interrupts
 from deixis_runtime.session import Unreachable, first_line
 from deixis_schemas import codec, topics
-from deixis_schemas.messages import CameraInfo, Health, Message, State, Target
+from deixis_schemas.messages import CameraInfo, Health, Message, OfFrame, State, Target
 
+from .frame_tally import FrameTally
 from .gets import TIMEOUT_S, get_healths, get_names, get_raw, get_state
 from .inbox import Inbox, Received
 from .mcap_file import McapFileError, McapRecorder
@@ -40,10 +41,10 @@ Beside = Callable[[zenoh.Session], AbstractContextManager[object]]
 class PlayResult:
     """What came out of a run.
 
-    frames: frames seen. targets: the final ones, the last 1000. health: the last record of each stage. counters: messages
-    by type under their names; `rejected` (broke the contract), `lost` (we were too slow), `unanswered` (stages that did not
-    answer the last frame). names: of the POIs by id. failure: why it did not do its job, or none. signal: of the interrupt,
-    or none.
+    frames: that the camera gave. targets: the final ones, the last 1000. health: the last record of each stage. counters:
+    messages by type under their names; `rejected` (broke the contract), `lost` (we were too slow), `unanswered` (stages that
+    did not answer the last frame). names: of the POIs by id. failure: why it did not do its job, or none. signal: of the
+    interrupt, or none.
     """
 
     frames: int = 0
@@ -115,6 +116,7 @@ class Playback:
         self._inbox = Inbox()
         self._end = PlayEnd(options.stages)
         self._counts: Counter[str] = Counter()
+        self._tally = FrameTally()
         # By episode, as sent: 3 kB each. As objects a thousand take ten times that, and a looped clip fills them in an hour.
         self._targets: deque[tuple[str, bytes]] = deque(maxlen=MAX_TARGETS)
 
@@ -145,7 +147,7 @@ class Playback:
         self._counts["lost"] = self._inbox.lost
         for key, why in self._inbox.rejections.items():
             log.warning("%s: not recorded: %s", key, why)
-        result.frames = self._counts["Frame"]
+        result.frames = self._tally.frames if self._counts["Frame"] else 0
         result.targets = [codec.decode(Target, sent, codec.encoding_of(Target)) for _, sent in self._targets]
         result.counters = dict(self._counts)
         result.camera = self._end.camera
@@ -190,6 +192,8 @@ class Playback:
         if message is None:
             return
         self._counts[type(message).__name__] += 1
+        if isinstance(message, OfFrame):
+            self._tally.note(message.frame_id)
         if isinstance(message, Health) and message.stage != topics.SUPERVISOR:
             self.result.health[message.stage] = message
         if isinstance(message, Target) and message.final:
