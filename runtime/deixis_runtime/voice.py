@@ -152,7 +152,7 @@ class Voice:
             return None
         flowing = now_s - self._newest_s < FLOWING_S
         ahead = FrameId(self._newest.run, self._newest.seq + 1 + (LEAD_FRAMES if flowing else 0))
-        # A place that was taken over may begin later than that. By where it was put when it was taken: its run may be forgotten.
+        # A place that was taken over may begin later. By where it stood when it was taken: its run may be forgotten by now.
         return self.fence if self.fence is not None and self._from > self._order.place(ahead) else ahead
 
     def must_stay(self, now_s: float) -> str:

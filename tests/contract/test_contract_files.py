@@ -75,6 +75,6 @@ def unbounded(schema: object, path: str = "") -> list[str]:
 
 
 def test_no_whole_number_is_without_bounds():
-    """A person_id beyond 2^63, which the schema of tracks allowed and those of gestures and beliefs did not, ended both stages."""
+    """A person_id beyond 2^63, which tracks might have and gestures and beliefs might not, ended both stages."""
     for path in sorted(FOLDER.glob("*.schema.json")):
         assert unbounded(json.loads(path.read_text())) == [], path.name
