@@ -283,6 +283,31 @@ def test_a_recording_that_cannot_be_read_costs_no_file_and_opens_no_page(tmp_pat
 
 
 @needs_rerun
+def test_a_view_that_is_refused_leaves_the_file_that_was_there_and_makes_no_new_one(run, tmp_path, capsys):
+    clip, out, fresh = tmp_path / "small.avi", tmp_path / "out.rrd", tmp_path / "fresh" / "out.rrd"
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (320, 240))
+    writer.write(np.zeros((240, 320, 3), np.uint8))
+    writer.release()
+    out.write_bytes(b"drawn before")
+    for path in (out, fresh):
+        assert main(["view", str(run / "pointing.mcap"), "--pictures", str(clip), "--out", str(path)]) == 1
+        assert "is 320 x 240, but the recording was made of 640 x 480" in capsys.readouterr().err
+    assert out.read_bytes() == b"drawn before"
+    assert list(fresh.parent.iterdir()) == []
+    assert {path.name for path in tmp_path.iterdir()} == {"fresh", "out.rrd", "small.avi"}
+
+
+@needs_rerun
+def test_a_run_that_does_not_start_leaves_the_drawing_that_was_there(tmp_path):
+    out = tmp_path / "out.rrd"
+    out.write_bytes(b"drawn before")
+    argv = command("deixis", "run", tmp_path / "none.mp4", "--robot", "test-none", "--view", out)
+    done = subprocess.run(argv, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1, done.stderr
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("out.rrd", b"drawn before")]
+
+
+@needs_rerun
 def test_a_port_that_is_taken_is_said_in_one_line_and_no_viewer_is_started(run, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("deixis_view.viewer_process.ViewerProcess._start", lambda _: pytest.fail("a viewer is started"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))

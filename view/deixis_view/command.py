@@ -31,7 +31,7 @@ from rich.console import Console
 from .drawer import Drawer, Painter
 from .feed import Feed
 from .hearing import hear, keys_of
-from .installed import check_installed, new_sink, sink_for_file
+from .installed import SinkError, check_installed, new_sink, sink_for_file
 from .options import add_draw_options, draw_options, known_place, scene_of
 from .recording import messages, paint_all
 from .scene import Scene
@@ -86,9 +86,11 @@ def run(given: argparse.Namespace) -> int:
                 damage = _recorded(given, raws, painter, show)
             elif session is not None:
                 _live(given, session, scene, painter, show)
+            if damage and not painter.shots:
+                raise CommandError(damage)
             if not sink.close() and given.out is not None:
                 raise CommandError(f"'{given.out}' could not be written to its end")
-    except (ViewerError, McapFileError) as error:
+    except (ViewerError, McapFileError, SinkError) as error:
         raise CommandError(str(error)) from None
     if painter.left_out:
         print(f"deixis view: {painter.left_out} frames were left out: the viewer did not keep up", file=sys.stderr)
@@ -135,7 +137,11 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
     """Where it is drawn, and the viewer, where there is one. Raises CommandError, ViewerError."""
     name = given.file.stem if given.file is not None else given.robot
     if given.out is not None:
-        yield None, sink_for_file(given.out, name=name)
+        sink = sink_for_file(given.out, name=name)
+        try:
+            yield None, sink
+        finally:
+            sink.discard()
         return
     viewer = ViewerProcess(window=not given.web)
     with ExitStack() as stack:
