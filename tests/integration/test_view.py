@@ -365,3 +365,14 @@ def test_damage_deep_in_a_recording_is_said_in_one_line_and_what_comes_before_it
     assert subprocess.run([BIN / "rerun", "rrd", "verify", out], capture_output=True, check=False).returncode == 0
     drawn_before = len({row["seq"] for row in columns(out)["/picture/tracks"]})
     assert 5 < drawn_before < DRAWN
+
+
+@needs_rerun
+def test_a_recording_that_was_cut_off_is_said_to_be_and_what_it_holds_is_drawn(run, tmp_path, capsys):
+    cut, out = tmp_path / "cut.mcap", tmp_path / "out.rrd"
+    content = (run / "pointing.mcap").read_bytes()
+    cut.write_bytes(content[: len(content) // 2])
+    assert main(["view", str(cut), "--site", str(SITE), "--out", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert f"deixis view: '{cut}' was cut off while it was written; what it holds is used\n" in said
+    assert 5 < len({row["seq"] for row in columns(out)["/picture/tracks"]}) < DRAWN

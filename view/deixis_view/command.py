@@ -17,7 +17,7 @@ from typing import Any
 
 import zenoh
 from deixis_cli.gets import get_all, get_pois, get_state, get_timed_healths
-from deixis_cli.mcap_file import McapFileError
+from deixis_cli.mcap_file import McapFileError, McapReader
 from deixis_cli.options import CommandError, add_connect, seconds
 from deixis_cli.raw_message import RawMessage
 from deixis_runtime.clock_offset import estimate
@@ -66,6 +66,8 @@ def run(given: argparse.Namespace) -> int:
     """Draw until Ctrl-C, --seconds, or the window is closed: then 0; a recording into a file until its end. 1 where that is
     damaged, with what came before it drawn.
 
+    A recording that was cut off counts as whole, and is said to be cut off.
+
     Raises CommandError, or Unreachable without a router.
     """
     _check(given)
@@ -76,14 +78,15 @@ def run(given: argparse.Namespace) -> int:
             interrupts = stack.enter_context(Interrupts())
             # First: where nothing can be reached or read, no window opens and no file is begun.
             session = stack.enter_context(open_client(given.connect, shared_memory=False)) if given.file is None else None
-            raws = _begun(given) if given.file is not None else None
+            recording = McapReader(given.file) if given.file is not None else None
+            raws = _begun(recording, given.pictures) if recording is not None else None
             viewer, sink = stack.enter_context(_sink(given))
             scene = scene_of(known, draw_options(given), live=given.file is None)
             painter = Painter(scene, sink)
             show = Showing(viewer, interrupts, until_s)
             damage = ""
-            if raws is not None:
-                damage = _recorded(given, raws, painter, show)
+            if recording is not None and raws is not None:
+                damage = _recorded(given, recording, raws, painter, show)
             elif session is not None:
                 _live(given, session, scene, painter, show)
             if damage and not painter.shots:
@@ -154,16 +157,19 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
         yield viewer, sink.to_viewer(viewer.url)
 
 
-def _begun(given: argparse.Namespace) -> Iterator[RawMessage]:
+def _begun(recording: McapReader, clip: Path | None) -> Iterator[RawMessage]:
     """A recording's messages, the first of them read. Raises McapFileError, CommandError where there is none to draw."""
-    raws = messages(given.file, given.pictures)
+    raws = messages(recording, clip)
     first = next(raws, None)
     if first is None:
-        raise CommandError(f"'{given.file}' holds no message")
+        cut = ": it was cut off while it was written" if recording.cut else ""
+        raise CommandError(f"'{recording.path}' holds no message{cut}")
     return chain((first,), raws)
 
 
-def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Painter, show: Showing) -> str:
+def _recorded(
+    given: argparse.Namespace, recording: McapReader, raws: Iterator[RawMessage], painter: Painter, show: Showing
+) -> str:
     """Draw a recording, and stay with its viewer; what is damaged in it, with what came before drawn.
 
     Raises CommandError, ViewerError.
@@ -176,6 +182,8 @@ def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Pa
             damage = str(error)
     if damage:
         print(f"deixis view: {damage}; what comes before that is drawn", file=sys.stderr)
+    if recording.cut:
+        print(f"deixis view: {recording.cut_off}", file=sys.stderr)
     print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
     if given.out is not None:
         print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
