@@ -28,7 +28,7 @@ from deixis_view.scene import UNRECORDED, Scene
 from deixis_view.workplace import remove_left
 from headless_browser import needs_chromium, page
 from rerun_ready import columns, needs_rerun
-from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, wait_until
+from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, system, wait_until
 from stuck_viewer import StuckSink
 
 FRAMES = 126
@@ -376,3 +376,16 @@ def test_a_recording_that_was_cut_off_is_said_to_be_and_what_it_holds_is_drawn(r
     said = capsys.readouterr().err
     assert f"deixis view: '{cut}' was cut off while it was written; what it holds is used\n" in said
     assert 5 < len({row["seq"] for row in columns(out)["/picture/tracks"]}) < DRAWN
+
+
+@needs_rerun
+def test_what_runs_is_drawn_into_a_file_and_it_says_how_many_times_and_how_to_show_it(tmp_path, capsys):
+    out = tmp_path / "live.rrd"
+    with system(tmp_path, "test-live") as running:
+        running.wait_until(lambda: running.state().get("sources"), "fusion")
+        argv = ["view", "--robot", "test-live", "--connect", running.endpoint, "--out", str(out), "--seconds", "3"]
+        assert main(argv) == 0
+    times, shows = capsys.readouterr().err.splitlines()[-2:]
+    assert int(re.fullmatch(r"robot test-live: (\d+) times drawn", times).group(1)) > 5
+    assert shows == f"{out}: 'rerun {out}' shows it"
+    assert len(columns(out)["/picture"]) > 5

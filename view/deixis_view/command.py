@@ -93,6 +93,9 @@ def run(given: argparse.Namespace) -> int:
                 raise CommandError(damage)
             if not sink.close() and given.out is not None:
                 raise CommandError(f"'{given.out}' could not be written to its end")
+            if given.out is not None:
+                _tell_drawn(str(given.file or f"robot {given.robot}"), painter)
+                print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
     except (ViewerError, McapFileError, SinkError) as error:
         raise CommandError(str(error)) from None
     if painter.left_out:
@@ -184,12 +187,14 @@ def _recorded(
         print(f"deixis view: {damage}; what comes before that is drawn", file=sys.stderr)
     if recording.cut:
         print(f"deixis view: {recording.cut_off}", file=sys.stderr)
-    print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
-    if given.out is not None:
-        print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
-    else:
+    if given.out is None:
+        _tell_drawn(str(given.file), painter)
         show.stay()
     return damage
+
+
+def _tell_drawn(what: str, painter: Painter) -> None:
+    print(f"{what}: {painter.shots} times drawn", file=sys.stderr, flush=True)
 
 
 def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, painter: Painter, show: Showing) -> None:
