@@ -263,6 +263,8 @@ def test_it_says_what_is_missing(tmp_path, capsys, monkeypatch):
 
     assert "--robot" in said("view", "--web")
     assert "--web" in said("view", "--robot", "r1")  # there is no display
+    both = said("view", "a.mcap", "--robot", "r1", "--web")
+    assert both == "deixis: --robot r1 goes with a running system: 'a.mcap' says itself whose it is\n"
     assert ".rrd" in said("run", CLIP, "--view", tmp_path / "clip.mp4")
     assert not (tmp_path / "clip.mp4").exists()
     monkeypatch.setattr("deixis_view.installed.find_spec", lambda _: None)

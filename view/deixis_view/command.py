@@ -131,6 +131,8 @@ class Showing:
 def _check(given: argparse.Namespace) -> None:
     if given.file is None and not given.robot:
         raise CommandError("say which robot (--robot NAME), or a recording (FILE.mcap)")
+    if given.file is not None and given.robot:
+        raise CommandError(f"--robot {given.robot} goes with a running system: '{given.file}' says itself whose it is")
     if given.file is None and given.pictures is not None:
         raise CommandError("--pictures CLIP goes with a recording")
     if not given.web and given.out is None and not has_display():
