@@ -101,9 +101,12 @@ def _read(given: argparse.Namespace) -> tuple[Heard, Labels, bool]:
     if given.labels is None:
         raise CommandError("--from needs --labels: who pointed at what, when, from where")
     labels, heard, inbox = load_labels(given.labels), Heard(), Inbox()
-    for raw in McapReader(given.recording):
+    reader = McapReader(given.recording)
+    for raw in reader:
         if topics.topic_of(raw.key) in LISTENED and (received := inbox.read(raw)) is not None:
             heard.hear(received.message)
+    if reader.cut:
+        print(f"deixis calibrate site: {reader.cut_off}", file=sys.stderr)
     if not heard.tracked():
         raise CommandError(f"'{given.recording}' holds no tracks")
     return heard, labels, False

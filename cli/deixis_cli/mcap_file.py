@@ -129,6 +129,11 @@ class McapReader:
         self.cut = False
         """Whether the file ended before its end, as after a kill or a full disk; known when all has been read."""
 
+    @property
+    def cut_off(self) -> str:
+        """One line for people where it was; known when all has been read."""
+        return f"'{self.path}' was cut off while it was written; what it holds is used" if self.cut else ""
+
     def __iter__(self) -> Iterator[RawMessage]:
         """Raises McapFileError for a file that is missing or no recording; one that is cut gives what it holds."""
         try:

@@ -116,7 +116,7 @@ class Replayer:
         else:
             self._play_at_own_rate(lines, instance)
         if reader.cut:
-            log.warning("'%s' was cut off while it was written; it has been played as far as it goes", self._path)
+            log.warning("%s", reader.cut_off)
 
     def _play_at_own_rate(self, lines: Iterator[Line], instance: str) -> None:
         pace, began_s = Pace(), time.monotonic()

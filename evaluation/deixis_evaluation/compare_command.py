@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -39,7 +40,7 @@ class Run:
     """What a recording holds of each stage, in the order heard; of the camera's first run alone, which is one pass of a source.
 
     heard_ns, answered_ns: by frame, when its first message and its belief were heard. unreadable: messages that break the
-    contract. later: messages of later runs.
+    contract. later: messages of later runs. cut_off: one line for people where the recording was cut off, or empty.
     """
 
     by_stage: dict[str, list[Message]] = field(default_factory=dict)
@@ -47,6 +48,7 @@ class Run:
     answered_ns: dict[FrameId, int] = field(default_factory=dict)
     unreadable: int = 0
     later: int = 0
+    cut_off: str = ""
 
     def took_ms(self) -> list[float]:
         """Of each answered frame, from the first that was heard of it to its belief, ms."""
@@ -74,6 +76,8 @@ def run(given: argparse.Namespace) -> int:
     except McapFileError as error:
         raise CommandError(str(error)) from None
     for path, found in ((given.first, first), (given.second, second)):
+        if found.cut_off:
+            print(f"deixis compare: {found.cut_off}", file=sys.stderr)
         if not found.by_stage:
             raise CommandError(f"'{path}' holds no answers of any stage to a frame")
     compared = compare(first, second)
@@ -98,7 +102,8 @@ def compare(first: Run, second: Run) -> list[StageComparison]:
 def read_run(path: Path) -> Run:
     """The run in a recording. Raises McapFileError."""
     found, first_run = Run(), None
-    for raw in McapReader(path):
+    reader = McapReader(path)
+    for raw in reader:
         topic = topics.topic_of(raw.key)
         if topic is None or raw.deleted or topic.stage not in topics.STAGES or topic is topics.POI:
             continue
@@ -114,6 +119,7 @@ def read_run(path: Path) -> Run:
             found.later += 1
             continue
         _add(found, topic.stage, message, raw.received_ns)
+    found.cut_off = reader.cut_off
     return found
 
 

@@ -28,7 +28,7 @@ from deixis_view.scene import UNRECORDED, Scene
 from deixis_view.workplace import remove_left
 from headless_browser import needs_chromium, page
 from rerun_ready import columns, needs_rerun
-from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, wait_until
+from running import BIN, CLIP, POINTED_AT, SITE, children, command, free_port, process, system, wait_until
 from stuck_viewer import StuckSink
 
 FRAMES = 126
@@ -263,6 +263,8 @@ def test_it_says_what_is_missing(tmp_path, capsys, monkeypatch):
 
     assert "--robot" in said("view", "--web")
     assert "--web" in said("view", "--robot", "r1")  # there is no display
+    both = said("view", "a.mcap", "--robot", "r1", "--web")
+    assert both == "deixis: --robot r1 goes with a running system: 'a.mcap' says itself whose it is\n"
     assert ".rrd" in said("run", CLIP, "--view", tmp_path / "clip.mp4")
     assert not (tmp_path / "clip.mp4").exists()
     monkeypatch.setattr("deixis_view.installed.find_spec", lambda _: None)
@@ -280,6 +282,31 @@ def test_a_recording_that_cannot_be_read_costs_no_file_and_opens_no_page(tmp_pat
         assert main(["view", str(recording), "--web", "--port", "0"]) == 1
         assert capsys.readouterr().out == ""
     assert out.read_bytes() == b"drawn before"
+
+
+@needs_rerun
+def test_a_view_that_is_refused_leaves_the_file_that_was_there_and_makes_no_new_one(run, tmp_path, capsys):
+    clip, out, fresh = tmp_path / "small.avi", tmp_path / "out.rrd", tmp_path / "fresh" / "out.rrd"
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (320, 240))
+    writer.write(np.zeros((240, 320, 3), np.uint8))
+    writer.release()
+    out.write_bytes(b"drawn before")
+    for path in (out, fresh):
+        assert main(["view", str(run / "pointing.mcap"), "--pictures", str(clip), "--out", str(path)]) == 1
+        assert "is 320 x 240, but the recording was made of 640 x 480" in capsys.readouterr().err
+    assert out.read_bytes() == b"drawn before"
+    assert list(fresh.parent.iterdir()) == []
+    assert {path.name for path in tmp_path.iterdir()} == {"fresh", "out.rrd", "small.avi"}
+
+
+@needs_rerun
+def test_a_run_that_does_not_start_leaves_the_drawing_that_was_there(tmp_path):
+    out = tmp_path / "out.rrd"
+    out.write_bytes(b"drawn before")
+    argv = command("deixis", "run", tmp_path / "none.mp4", "--robot", "test-none", "--view", out)
+    done = subprocess.run(argv, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1, done.stderr
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("out.rrd", b"drawn before")]
 
 
 @needs_rerun
@@ -340,3 +367,27 @@ def test_damage_deep_in_a_recording_is_said_in_one_line_and_what_comes_before_it
     assert subprocess.run([BIN / "rerun", "rrd", "verify", out], capture_output=True, check=False).returncode == 0
     drawn_before = len({row["seq"] for row in columns(out)["/picture/tracks"]})
     assert 5 < drawn_before < DRAWN
+
+
+@needs_rerun
+def test_a_recording_that_was_cut_off_is_said_to_be_and_what_it_holds_is_drawn(run, tmp_path, capsys):
+    cut, out = tmp_path / "cut.mcap", tmp_path / "out.rrd"
+    content = (run / "pointing.mcap").read_bytes()
+    cut.write_bytes(content[: len(content) // 2])
+    assert main(["view", str(cut), "--site", str(SITE), "--out", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert f"deixis view: '{cut}' was cut off while it was written; what it holds is used\n" in said
+    assert 5 < len({row["seq"] for row in columns(out)["/picture/tracks"]}) < DRAWN
+
+
+@needs_rerun
+def test_what_runs_is_drawn_into_a_file_and_it_says_how_many_times_and_how_to_show_it(tmp_path, capsys):
+    out = tmp_path / "live.rrd"
+    with system(tmp_path, "test-live") as running:
+        running.wait_until(lambda: running.state().get("sources"), "fusion")
+        argv = ["view", "--robot", "test-live", "--connect", running.endpoint, "--out", str(out), "--seconds", "3"]
+        assert main(argv) == 0
+    times, shows = capsys.readouterr().err.splitlines()[-2:]
+    assert int(re.fullmatch(r"robot test-live: (\d+) times drawn", times).group(1)) > 5
+    assert shows == f"{out}: 'rerun {out}' shows it"
+    assert len(columns(out)["/picture"]) > 5

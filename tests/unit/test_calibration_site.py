@@ -184,6 +184,17 @@ def test_of_a_session_that_was_ended_early_the_pointings_until_then_count(sessio
     assert [one["poi_id"] for one in said["after"]] == ["P1", "P2"]
 
 
+def test_a_recorded_session_that_was_cut_off_is_said_to_be(session, tmp_path, capsys):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((session / "session.mcap").read_bytes()[:-10])
+    labels = json.loads((session / "labels.yaml").read_text())
+    labels["pointings"] = labels["pointings"][:2]
+    (tmp_path / "labels.yaml").write_text(json.dumps(labels))
+    assert calibrate(session, "--from", cut, "--labels", tmp_path / "labels.yaml") == 3
+    said = f"deixis calibrate site: '{cut}' was cut off while it was written; what it holds is used"
+    assert said in capsys.readouterr().err.splitlines()
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

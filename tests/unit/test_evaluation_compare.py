@@ -92,3 +92,12 @@ def test_what_holds_no_answers_is_refused_by_name(tmp_path, first):
         command(first, empty)
     with pytest.raises(CommandError, match=r"none\.mcap"):
         command(first, tmp_path / "none.mcap")
+
+
+def test_a_recording_that_was_cut_off_is_said_to_be_and_what_it_holds_is_compared(tmp_path, first, capsys):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(first.read_bytes()[:-10])
+    assert command(first, cut) == 0
+    said = capsys.readouterr()
+    assert said.err == f"deixis compare: '{cut}' was cut off while it was written; what it holds is used\n"
+    assert said.out.splitlines()[0] == "headpose: 100 messages, all equal"

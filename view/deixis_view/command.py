@@ -17,7 +17,7 @@ from typing import Any
 
 import zenoh
 from deixis_cli.gets import get_all, get_pois, get_state, get_timed_healths
-from deixis_cli.mcap_file import McapFileError
+from deixis_cli.mcap_file import McapFileError, McapReader
 from deixis_cli.options import CommandError, add_connect, seconds
 from deixis_cli.raw_message import RawMessage
 from deixis_runtime.clock_offset import estimate
@@ -31,7 +31,7 @@ from rich.console import Console
 from .drawer import Drawer, Painter
 from .feed import Feed
 from .hearing import hear, keys_of
-from .installed import check_installed, new_sink, sink_for_file
+from .installed import SinkError, check_installed, new_sink, sink_for_file
 from .options import add_draw_options, draw_options, known_place, scene_of
 from .recording import messages, paint_all
 from .scene import Scene
@@ -66,6 +66,8 @@ def run(given: argparse.Namespace) -> int:
     """Draw until Ctrl-C, --seconds, or the window is closed: then 0; a recording into a file until its end. 1 where that is
     damaged, with what came before it drawn.
 
+    A recording that was cut off counts as whole, and is said to be cut off.
+
     Raises CommandError, or Unreachable without a router.
     """
     _check(given)
@@ -76,19 +78,25 @@ def run(given: argparse.Namespace) -> int:
             interrupts = stack.enter_context(Interrupts())
             # First: where nothing can be reached or read, no window opens and no file is begun.
             session = stack.enter_context(open_client(given.connect, shared_memory=False)) if given.file is None else None
-            raws = _begun(given) if given.file is not None else None
+            recording = McapReader(given.file) if given.file is not None else None
+            raws = _begun(recording, given.pictures) if recording is not None else None
             viewer, sink = stack.enter_context(_sink(given))
             scene = scene_of(known, draw_options(given), live=given.file is None)
             painter = Painter(scene, sink)
             show = Showing(viewer, interrupts, until_s)
             damage = ""
-            if raws is not None:
-                damage = _recorded(given, raws, painter, show)
+            if recording is not None and raws is not None:
+                damage = _recorded(given, recording, raws, painter, show)
             elif session is not None:
                 _live(given, session, scene, painter, show)
+            if damage and not painter.shots:
+                raise CommandError(damage)
             if not sink.close() and given.out is not None:
                 raise CommandError(f"'{given.out}' could not be written to its end")
-    except (ViewerError, McapFileError) as error:
+            if given.out is not None:
+                _tell_drawn(str(given.file or f"robot {given.robot}"), painter)
+                print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
+    except (ViewerError, McapFileError, SinkError) as error:
         raise CommandError(str(error)) from None
     if painter.left_out:
         print(f"deixis view: {painter.left_out} frames were left out: the viewer did not keep up", file=sys.stderr)
@@ -123,6 +131,8 @@ class Showing:
 def _check(given: argparse.Namespace) -> None:
     if given.file is None and not given.robot:
         raise CommandError("say which robot (--robot NAME), or a recording (FILE.mcap)")
+    if given.file is not None and given.robot:
+        raise CommandError(f"--robot {given.robot} goes with a running system: '{given.file}' says itself whose it is")
     if given.file is None and given.pictures is not None:
         raise CommandError("--pictures CLIP goes with a recording")
     if not given.web and given.out is None and not has_display():
@@ -135,7 +145,11 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
     """Where it is drawn, and the viewer, where there is one. Raises CommandError, ViewerError."""
     name = given.file.stem if given.file is not None else given.robot
     if given.out is not None:
-        yield None, sink_for_file(given.out, name=name)
+        sink = sink_for_file(given.out, name=name)
+        try:
+            yield None, sink
+        finally:
+            sink.discard()
         return
     viewer = ViewerProcess(window=not given.web)
     with ExitStack() as stack:
@@ -148,16 +162,19 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
         yield viewer, sink.to_viewer(viewer.url)
 
 
-def _begun(given: argparse.Namespace) -> Iterator[RawMessage]:
+def _begun(recording: McapReader, clip: Path | None) -> Iterator[RawMessage]:
     """A recording's messages, the first of them read. Raises McapFileError, CommandError where there is none to draw."""
-    raws = messages(given.file, given.pictures)
+    raws = messages(recording, clip)
     first = next(raws, None)
     if first is None:
-        raise CommandError(f"'{given.file}' holds no message")
+        cut = ": it was cut off while it was written" if recording.cut else ""
+        raise CommandError(f"'{recording.path}' holds no message{cut}")
     return chain((first,), raws)
 
 
-def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Painter, show: Showing) -> str:
+def _recorded(
+    given: argparse.Namespace, recording: McapReader, raws: Iterator[RawMessage], painter: Painter, show: Showing
+) -> str:
     """Draw a recording, and stay with its viewer; what is damaged in it, with what came before drawn.
 
     Raises CommandError, ViewerError.
@@ -170,12 +187,16 @@ def _recorded(given: argparse.Namespace, raws: Iterator[RawMessage], painter: Pa
             damage = str(error)
     if damage:
         print(f"deixis view: {damage}; what comes before that is drawn", file=sys.stderr)
-    print(f"{given.file}: {painter.shots} times drawn", file=sys.stderr, flush=True)
-    if given.out is not None:
-        print(f"{given.out}: 'rerun {given.out}' shows it", file=sys.stderr)
-    else:
+    if recording.cut:
+        print(f"deixis view: {recording.cut_off}", file=sys.stderr)
+    if given.out is None:
+        _tell_drawn(str(given.file), painter)
         show.stay()
     return damage
+
+
+def _tell_drawn(what: str, painter: Painter) -> None:
+    print(f"{what}: {painter.shots} times drawn", file=sys.stderr, flush=True)
 
 
 def _live(given: argparse.Namespace, session: zenoh.Session, scene: Scene, painter: Painter, show: Showing) -> None:

@@ -17,6 +17,10 @@ MISSING = (
 )
 
 
+class SinkError(OSError):
+    """What is drawn cannot be kept; the text names the file."""
+
+
 def check_installed() -> None:
     """Raises CommandError where Rerun is not installed."""
     if find_spec("rerun") is None:
@@ -35,11 +39,14 @@ def new_sink(name: str, *, live: bool) -> RerunSink:
 
 
 def sink_for_file(path: Path, *, name: str) -> RerunSink:
-    """A sink to a file, which is begun anew. Raises CommandError where that cannot be, or where the name says another kind."""
+    """A sink to a file, which takes the place of one that is there when it is closed.
+
+    Raises CommandError where that cannot be, or where the name says another kind.
+    """
     if path.suffix != SUFFIX:
         raise CommandError(f"'{path}': what is drawn goes to a file of Rerun's, whose name ends in {SUFFIX}")
     sink = new_sink(name, live=False)
     try:
         return sink.to_file(path)
-    except OSError as error:
+    except SinkError as error:
         raise CommandError(str(error)) from None

@@ -16,13 +16,13 @@ from deixis_schemas.messages import Frame, Tracks
 SEEN_AT = topics.TRACKS
 
 
-def messages(path: Path, clip: Path | None) -> Iterator[RawMessage]:
+def messages(recording: McapReader, clip: Path | None) -> Iterator[RawMessage]:
     """What a recording holds, in its order; with the pictures of `clip` where one is given.
 
     Raises McapFileError, and CommandError for a clip that is none, or not of this recording.
     """
     pictures = _ClipPictures(clip) if clip is not None else None
-    for raw in McapReader(path):
+    for raw in recording:
         if pictures is not None and topics.topic_of(raw.key) is SEEN_AT:
             frame = pictures.of(raw)
             if frame is not None:

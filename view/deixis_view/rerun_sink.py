@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import rerun as rr
 
 from .blueprint import blueprint
 from .drawing import Arrows, Boxes, CurveStyle, Dots, Drawing, Layout, Lines, Note, Page, Picture, Primitive, Shot, Value
+from .installed import SinkError
 
 APPLICATION = "deixis"
 FLUSH_S = 0.25
@@ -19,10 +21,6 @@ TRY_AGAIN_S = 1.0
 """A viewer that has let us wait in vain is not waited for again so soon."""
 END_S = 5.0
 BATCH_S, BATCH_BYTES = 1.0, 4 << 20
-
-
-class SinkError(OSError):
-    """What is drawn cannot be kept; the text names the file."""
 
 
 class RerunSink:
@@ -40,15 +38,25 @@ class RerunSink:
         self._stream = rr.RecordingStream(APPLICATION, batcher_config=batches)
         self._stream.send_recording_name(name)
         self._stuck_until_s = 0.0
+        self._out: tuple[Path, Path] | None = None
 
     def to_file(self, path: Path) -> RerunSink:
-        """Write a file. Raises SinkError where that cannot be made."""
+        """Write a file, which has its name when all is in it: until `close` a file that is there stays as it was.
+
+        Raises SinkError where that cannot be made.
+        """
+        part = path.with_name(f"{path.stem}.part{path.suffix}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.open("wb").close()
+            if path.is_dir():
+                raise SinkError(f"'{path}' is a folder")
+            part.open("wb").close()
         except OSError as error:
-            raise SinkError(f"'{path}': {error.strerror}") from None
-        self._stream.save(path)
+            raise error if isinstance(error, SinkError) else SinkError(f"'{path}': {error.strerror}") from None
+        self._out = part, path
+        # Also where nobody comes to discard it, as when a run does not start.
+        self._discard_part = weakref.finalize(self, part.unlink, missing_ok=True)
+        self._stream.save(part)
         return self
 
     def to_viewer(self, url: str) -> RerunSink:
@@ -75,11 +83,30 @@ class RerunSink:
         return True
 
     def close(self) -> bool:
-        """Send what is left, for a few seconds at most; whether all went."""
+        """Send what is left, for a few seconds at most; whether all went. A file gets its name then.
+
+        Raises SinkError where it cannot.
+        """
         sent = self._flushed(END_S)
         if sent:
             self._stream.disconnect()
+            self._name_file()
         return sent
+
+    def discard(self) -> None:
+        """Leave no file that was not closed."""
+        if self._out is not None:
+            self._discard_part()
+
+    def _name_file(self) -> None:
+        if self._out is None:
+            return
+        part, path = self._out
+        try:
+            part.replace(path)
+        except OSError as error:
+            raise SinkError(f"'{path}': {error.strerror}") from None
+        self._discard_part.detach()
 
     def _takes_more(self) -> bool:
         """Whether the viewer has taken all that was sent: the library itself keeps hundreds of megabytes before it waits."""
