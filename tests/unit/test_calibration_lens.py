@@ -190,6 +190,32 @@ def test_a_blurred_picture_is_left_out_and_named():
     )
 
 
+@pytest.mark.parametrize("small", [["view0"], ["view3", "view7", "view11"]])
+def test_the_size_that_most_pictures_have_is_measured_whichever_comes_first(small, folder, tmp_path, capsys):
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for path in folder.glob("view*.png"):
+        picture = cv2.imread(str(path))
+        cv2.imwrite(str(pictures / path.name), cv2.resize(picture, (480, 360)) if path.stem in small else picture)
+    assert calibrate(pictures, "--out", tmp_path / "lens.yaml") == 0
+    assert (load_calibration(tmp_path / "lens.yaml").width, load_calibration(tmp_path / "lens.yaml").height) == SIZE
+    said = capsys.readouterr().out
+    assert f"{len(small)} of them: of 480 x 360 pixels, most of 640 x 480: a lens is measured at one size (view" in said
+    assert f"over {12 - len(small)} pictures" in said
+
+
+def test_of_as_many_pictures_of_two_sizes_the_larger_are_measured():
+    album = Album(CHESS, only_new=False, only_still=False)
+    seen = sightings(CHESS)
+    for one in seen[:3]:
+        album.add(one.name, type(one)(f"small {one.name}", (320, 240), one.ids, one.px / 2))
+    assert len(album.kept) == 3
+    for one in seen[3:6]:
+        album.add(one.name, one)
+    assert [one.name for one in album.kept] == ["view3", "view4", "view5"]
+    assert list(album.refused) == ["small view0", "small view1", "small view2"]
+
+
 def test_pictures_of_two_sizes_are_no_lens():
     seen = sightings(CHESS)
     seen[2] = type(seen[2])("wide", (1280, 720), seen[2].ids, seen[2].px)
