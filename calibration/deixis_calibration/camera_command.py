@@ -1,6 +1,7 @@
 """`deixis calibrate camera`: the camera's lens from pictures of a board, as a ROS camera_info YAML and a picture of its errors.
 
-Exit status: 0 when the lens was measured, 3 when it was and its error is above a pixel, 130 when stopped (what was seen until
+Exit status: 0 when the lens was measured, 3 when it was and is not to be trusted (an error above a
+pixel, or a focal length that is not determined, for all boards had one tilt), 130 when stopped (what was seen until
 then is measured and written all the same).
 """
 
@@ -25,7 +26,7 @@ from .boards import Board
 from .camera_info_file import write_camera_info
 from .coverage import Coverage, cover
 from .gathering import gather
-from .lens_advice import LARGE_ERROR_PX, advice
+from .lens_advice import LARGE_ERROR_PX, advice, tells_focal, told_tilt_deg
 from .lens_fit import MODELS, LensFit, LensFitError, fit_lens
 from .lens_picture import draw_lens, write_picture
 from .picture_sources import PictureSource, open_camera_stage, open_source
@@ -86,7 +87,7 @@ def run(given: argparse.Namespace) -> int:
     print(json.dumps(document) if given.json else _text(given, picture, fit, coverage, warnings, album))
     if stopped:
         return STOPPED
-    return POOR if fit.rms_px > LARGE_ERROR_PX else 0
+    return 0 if fit.rms_px <= LARGE_ERROR_PX and tells_focal(fit, coverage) else POOR
 
 
 def _opened(given: argparse.Namespace, interrupts: Interrupts) -> AbstractContextManager[PictureSource]:
@@ -142,20 +143,27 @@ def _write(
 
 def _text(given: argparse.Namespace, picture: Path, fit: LensFit, coverage: Coverage, warnings: list[str], album: Album) -> str:
     worst = max(fit.pictures, key=lambda fitted: fitted.rms_px)
-    known = "" if fit.focal_sigma is None else f" +- {100 * fit.focal_sigma:.2f} %"
     unused = _refused_text(album)
     return "\n".join(
         [
             f"error {fit.rms_px:.2f} px rms over {len(fit.pictures)} pictures; the worst has {worst.rms_px:.2f}: "
             + worst.sighting.name,
-            f"focal length {fit.matrix[0, 0]:.1f} px{known}, {fit.horizontal_fov_deg:.1f} degrees wide; {fit.model} "
-            + " ".join(f"{value:.4f}" for value in fit.distortion),
-            f"boards covered {100 * coverage.share:.0f} % of the picture, at tilts up to {coverage.tilt_deg:.0f} degrees apart",
+            f"{_focal_text(fit, coverage)}; {fit.model} " + " ".join(f"{value:.4f}" for value in fit.distortion),
+            f"boards covered {100 * coverage.share:.0f} % of the picture, at tilts up to "
+            f"{told_tilt_deg(fit, coverage):.0f} degrees apart",
             *([f"not used:{unused}"] if unused else []),
             *(f"warning: {warning}" for warning in warnings),
             f"{given.out}: name it in the site file, as camera.calibration; {picture}: how good it is",
         ]
     )
+
+
+def _focal_text(fit: LensFit, coverage: Coverage) -> str:
+    focal_px = f"{fit.matrix[0, 0]:.1f} px"
+    if not tells_focal(fit, coverage):
+        return f"focal length not determined: all boards had one tilt; {focal_px} fits best, and may be many times off"
+    known = "" if fit.focal_sigma is None else f" +- {100 * fit.focal_sigma:.2f} %"
+    return f"focal length {focal_px}{known}, {fit.horizontal_fov_deg:.1f} degrees wide"
 
 
 def _document(board: Board, fit: LensFit, coverage: Coverage, warnings: list[str], album: Album) -> dict[str, Any]:
@@ -169,9 +177,10 @@ def _document(board: Board, fit: LensFit, coverage: Coverage, warnings: list[str
         "camera_matrix": fit.matrix.ravel().tolist(),
         "distortion": list(fit.distortion),
         "rms_px": fit.rms_px,
-        "focal_sigma": fit.focal_sigma,
+        "focal_determined": tells_focal(fit, coverage),
+        "focal_sigma": fit.focal_sigma if tells_focal(fit, coverage) else None,
         "coverage": coverage.share,
-        "tilt_deg": coverage.tilt_deg,
+        "tilt_deg": told_tilt_deg(fit, coverage),
         "pictures": {**pictures, **odd},
         "refused": album.refused,
         "warnings": warnings,

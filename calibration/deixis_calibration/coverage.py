@@ -63,7 +63,7 @@ def cover(board: Board, sightings: Sequence[Sighting]) -> Coverage:
     normals = np.array([normal_of(board, sighting) for sighting in sightings])
     widths = [width_of(board, sighting) for sighting in sightings]
     reach = float(left), float(right), float(top), float(bottom)
-    return Coverage(len(sightings), counts, _spread_deg(normals), reach, max(widths), min(widths))
+    return Coverage(len(sightings), counts, spread_deg(normals), reach, max(widths), min(widths))
 
 
 def normal_of(board: Board, sighting: Sighting) -> NDArray[np.float64]:
@@ -112,6 +112,6 @@ def _place(down: int, across: int) -> str:
     return " ".join(words) or "middle"
 
 
-def _spread_deg(normals: NDArray[np.float64]) -> float:
+def spread_deg(normals: NDArray[np.float64]) -> float:
     """The largest angle between two of these unit vectors (n, 3)."""
     return float(np.degrees(np.arccos(np.clip((normals @ normals.T).min(), -1, 1))))

@@ -40,7 +40,7 @@ def gather(source: PictureSource, find: Find, album: Album, interrupts: Interrup
 
 def _look(picture: Named, find: Find, album: Album) -> None:
     if picture.image is None:
-        album.refused[picture.name] = picture.why
+        album.refuse(picture.name, picture.why)
     else:
         album.add(picture.name, find(picture.name, picture.image))
 

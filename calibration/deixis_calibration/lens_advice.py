@@ -18,7 +18,21 @@ UNEQUAL = 0.02
 
 def advice(fit: LensFit, coverage: Coverage) -> list[str]:
     """Warnings, the weightiest first; empty where nothing speaks against the lens. `coverage` is of the pictures that count."""
-    return [*_of_error(fit), *_of_pictures(fit, coverage), *_of_lens(fit)]
+    return [*_of_error(fit), *_of_pictures(fit, coverage), *_of_lens(fit, coverage)]
+
+
+def tells_focal(fit: LensFit, coverage: Coverage) -> bool:
+    """Whether boards were tilted enough for focal length and distance to be told apart. Where they were not, the fit's focal
+    length may be many times off, and its deviation is as wrong as it is.
+    """
+    return told_tilt_deg(fit, coverage) >= LEAST_TILT_DEG
+
+
+def told_tilt_deg(fit: LensFit, coverage: Coverage) -> float:
+    """The largest angle between two boards: by the measured lens, which may be wrong, and by the assumed one, through which
+    upright boards at the edge of a wide lens's picture look tilted, the smaller one.
+    """
+    return min(coverage.tilt_deg, fit.tilt_deg)
 
 
 def _of_error(fit: LensFit) -> Iterator[str]:
@@ -36,9 +50,10 @@ def _of_pictures(fit: LensFit, coverage: Coverage) -> Iterator[str]:
     count = len(fit.pictures)
     if count < FEW_PICTURES:
         yield f"{count} pictures are few: take {GOOD_PICTURES}"
-    if coverage.tilt_deg < LEAST_TILT_DEG:
+    if not tells_focal(fit, coverage):
+        tilt_deg = told_tilt_deg(fit, coverage)
         yield (
-            f"the board was at nearly the same tilt in all pictures (at most {coverage.tilt_deg:.0f} degrees apart): focal "
+            f"the board was at nearly the same tilt in all pictures (at most {tilt_deg:.0f} degrees apart): focal "
             "length and distance cannot be told apart; lean its top away, then a side, by 30 degrees and more"
         )
     if coverage.share < LEAST_SHARE:
@@ -50,8 +65,8 @@ def _of_pictures(fit: LensFit, coverage: Coverage) -> Iterator[str]:
         yield f"no corner came near the picture's edge at the {', '.join(coverage.unreached)}: distortion is largest there"
 
 
-def _of_lens(fit: LensFit) -> Iterator[str]:
-    if fit.focal_sigma is not None and fit.focal_sigma > UNSURE_FOCAL:
+def _of_lens(fit: LensFit, coverage: Coverage) -> Iterator[str]:
+    if fit.focal_sigma is not None and tells_focal(fit, coverage) and fit.focal_sigma > UNSURE_FOCAL:
         yield f"the focal length is known to {100 * fit.focal_sigma:.1f} % only: more tilts, and more pictures"
     (fx, _, cx), (_, fy, cy), _ = fit.matrix.tolist()
     width, height = fit.size

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .boards import Board
+from .coverage import spread_deg
 from .sightings import Sighting
 
 Model = Literal["plumb_bob", "rational_polynomial", "equidistant"]
@@ -36,10 +37,13 @@ class LensFitError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """One picture as the lens explains it: residual_px (n, 2), corners seen less corners expected."""
+    """One picture as the lens explains it: residual_px (n, 2), corners seen less corners expected; normal (3) of the board,
+    a unit vector before the camera.
+    """
 
     sighting: Sighting
     residual_px: NDArray[np.float64]
+    normal: NDArray[np.float64]
 
     @property
     def rms_px(self) -> float:
@@ -66,6 +70,11 @@ class LensFit:
     def rms_px(self) -> float:
         """Over all corners of the pictures that count."""
         return rms(np.concatenate([picture.residual_px for picture in self.pictures]))
+
+    @property
+    def tilt_deg(self) -> float:
+        """The largest angle between two boards of the pictures that count, as this lens has it."""
+        return spread_deg(np.array([picture.normal for picture in self.pictures]))
 
     @property
     def horizontal_fov_deg(self) -> float:
@@ -112,7 +121,11 @@ def _fitted(board: Board, sightings: Sequence[Sighting], model: Model) -> LensFi
     if not (np.isfinite(matrix).all() and all(map(math.isfinite, distortion)) and min(matrix[0, 0], matrix[1, 1]) > 0):
         raise LensFitError("no lens fits these pictures: the focal length is not a number; were all at the same tilt?")
     pictures = tuple(
-        Fitted(sighting, sighting.px - _projected(sighting.corner_m(board), pose, matrix, distortion, model))
+        Fitted(
+            sighting,
+            sighting.px - _projected(sighting.corner_m(board), pose, matrix, distortion, model),
+            np.asarray(cv2.Rodrigues(pose[0])[0][:, 2], np.float64),
+        )
         for sighting, pose in zip(sightings, poses, strict=True)
     )
     return LensFit(size, model, matrix, distortion, pictures, (), sigma)

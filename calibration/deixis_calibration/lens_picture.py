@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .coverage import ACROSS, DOWN, Coverage
+from .lens_advice import tells_focal, told_tilt_deg
 from .lens_fit import Fitted, LensFit
 
 Canvas = NDArray[np.uint8]
@@ -30,11 +31,12 @@ def draw_lens(fit: LensFit, coverage: Coverage) -> Canvas:
     width, height = fit.size
     high = round(PANEL_PX * height / width)
     canvas = np.full((TITLE_PX + high + LINE_PX + BARS_PX, 2 * PANEL_PX + 3 * GAP_PX, 3), GROUND, np.uint8)
-    _write(canvas, _title(fit), (GAP_PX, 24))
+    _write(canvas, _title(fit, coverage), (GAP_PX, 24))
     left = canvas[TITLE_PX : TITLE_PX + high, GAP_PX : GAP_PX + PANEL_PX]
     right = canvas[TITLE_PX : TITLE_PX + high, 2 * GAP_PX + PANEL_PX : 2 * GAP_PX + 2 * PANEL_PX]
     times = _magnification(fit.pictures, width)
-    said = f"where boards were seen: {100 * coverage.share:.0f} % of the picture, tilts up to {coverage.tilt_deg:.0f} deg apart"
+    tilt_deg = told_tilt_deg(fit, coverage)
+    said = f"where boards were seen: {100 * coverage.share:.0f} % of the picture, tilts up to {tilt_deg:.0f} deg apart"
     _write(canvas, said, (GAP_PX, 50), FAINT)
     _write(canvas, f"how far corners are off, {times} times as long", (2 * GAP_PX + PANEL_PX, 50), FAINT)
     _draw_coverage(left, fit, coverage)
@@ -49,8 +51,10 @@ def write_picture(path: Path, canvas: Canvas) -> None:
     path.write_bytes(data.tobytes())
 
 
-def _title(fit: LensFit) -> str:
+def _title(fit: LensFit, coverage: Coverage) -> str:
     fx, fy, cx, cy = fit.matrix[0, 0], fit.matrix[1, 1], fit.matrix[0, 2], fit.matrix[1, 2]
+    if not tells_focal(fit, coverage):
+        return f"FOCAL LENGTH NOT DETERMINED: boards of one tilt. {fx:.1f}, {fy:.1f} px fits best, and may be many times off"
     return (
         f"error {fit.rms_px:.2f} px rms in {len(fit.pictures)} pictures of {fit.size[0]} x {fit.size[1]}; focal length "
         f"{fx:.1f}, {fy:.1f} px ({fit.horizontal_fov_deg:.1f} deg wide), axis at ({cx:.1f}, {cy:.1f}); {fit.model}"

@@ -67,6 +67,8 @@ def run(given: argparse.Namespace) -> int:
     _check_out(given)
     try:
         heard, labels, early = _read(given) if given.recording else _ask(given, site)
+        if not labels.pointings:
+            return ENDED_EARLY
         with Console(stderr=True).status(f"weighing {len(labels.pointings)} pointings, as it is and as corrected ..."):
             report = judge(heard, labels, site, config, _source(given, labels))
         _write(given, report)
@@ -109,11 +111,22 @@ def _read(given: argparse.Namespace) -> tuple[Heard, Labels, bool]:
         print(f"deixis calibrate site: {reader.cut_off}", file=sys.stderr)
     if not heard.tracked():
         raise CommandError(f"'{given.recording}' holds no tracks")
+    if not labels.pointings:
+        raise CommandError(f"labels {given.labels}: pointings: there are none")
+    for number, label in enumerate(labels.pointings):
+        if label.from_s > heard.length_s:
+            raise CommandError(
+                f"labels {given.labels}: pointings.{number}: the labels lie after the recording's end: from {label.from_s:g} s "
+                f"on, where '{given.recording}' ends at {heard.length_s:.1f} s"
+            )
     return heard, labels, False
 
 
 def _ask(given: argparse.Namespace, site: Site) -> tuple[Heard, Labels, bool]:
-    """A session at a running system. Raises CommandError, Unreachable or McapFileError."""
+    """A session at a running system; without pointings only where it was ended before the first.
+
+    Raises CommandError, Unreachable or McapFileError.
+    """
     if given.robot is None:
         raise CommandError("give --robot NAME, or --from FILE.mcap with --labels FILE")
     if not given.stand:
@@ -133,10 +146,10 @@ def _ask(given: argparse.Namespace, site: Site) -> tuple[Heard, Labels, bool]:
     recording = given.keep / "session.mcap" if given.keep is not None else None
     session = Session(given.robot, given.connect, site, labels, chosen, given.rounds, recording)
     heard, labels, early = guide(session, Console(stderr=True))
-    if given.keep is not None:
-        write_labels(given.keep / "labels.yaml", labels)
-    if not labels.pointings:
+    if not labels.pointings and not early:
         raise CommandError("nobody was seen to point")
+    if labels.pointings and given.keep is not None:
+        write_labels(given.keep / "labels.yaml", labels)
     return heard, labels, early
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +31,8 @@ LOWER_S = 4.0
 SILENT_S = 5.0
 BELL = "\a"
 THANKS = "  thank you: lower the hand"
+COUNTS = "what was pointed at until now counts"
+NOTHING = "nobody has pointed at anything yet, and nothing is kept"
 NOT_HELD = "  no pointing was held; what fusion made of these seconds counts"
 
 
@@ -57,7 +59,7 @@ def guide(session: Session, console: Console) -> tuple[Heard, Labels, bool]:
     labelled: list[Labelled] = []
     early = False
     with ExitStack() as stack:
-        listener = Listener(stack, session)
+        listener = Listener(stack, session, labelled)
         columns = TextColumn("pointings"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         progress = stack.enter_context(Progress(*columns, console=console))
         task = progress.add_task("", total=len(asked))
@@ -70,7 +72,7 @@ def guide(session: Session, console: Console) -> tuple[Heard, Labels, bool]:
                 console.print(THANKS if held else NOT_HELD)
                 _lower(listener)
         except (KeyboardInterrupt, EOFError):
-            console.print("ended early: what was pointed at until now counts")
+            console.print(f"ended early: {COUNTS if labelled else NOTHING}")
             early = True
     return listener.heard, session.labels.model_copy(update={"pointings": labelled}), early
 
@@ -78,10 +80,11 @@ def guide(session: Session, console: Console) -> tuple[Heard, Labels, bool]:
 class Listener:
     """Takes in what comes while a pointing is asked for, and nothing in between."""
 
-    def __init__(self, stack: ExitStack, session: Session) -> None:
+    def __init__(self, stack: ExitStack, session: Session, labelled: Sequence[Labelled]) -> None:
+        """`labelled` is filled meanwhile: without any in the end, nothing is kept."""
         zenoh_session = stack.enter_context(open_client(session.connect, shared_memory=False))
         self._inbox = Inbox()
-        self._recorder = stack.enter_context(McapRecorder(session.keep)) if session.keep is not None else None
+        self._recorder = stack.enter_context(_kept(session.keep, labelled)) if session.keep is not None else None
         self.heard = Heard()
         self._subscribers = [
             zenoh_session.declare_subscriber(topic.key(session.robot), self._inbox.store) for topic in LISTENED
@@ -116,6 +119,21 @@ class Listener:
         """Since the first frame that was taken in."""
         frames = self.heard.tracked()
         return max(0.0, (stamp_ns - frames[0].source.stamp_ns) / 1e9) if frames else 0.0
+
+
+@contextmanager
+def _kept(path: Path, labelled: Sequence[Labelled]) -> Iterator[McapRecorder]:
+    """Record there; what holds no pointing is taken away again, with the folders made for it: the next try needs the name."""
+    new_folders = [folder for folder in path.parents if not folder.exists()]
+    recorder = McapRecorder(path)
+    try:
+        with recorder:
+            yield recorder
+    finally:
+        if not labelled:
+            path.unlink()
+            for folder in new_folders:
+                folder.rmdir()
 
 
 def _come(one: Asked, session: Session, progress: Progress) -> None:

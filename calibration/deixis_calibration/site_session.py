@@ -60,6 +60,12 @@ class Heard:
         """Frames that the tracker has answered, by their time."""
         return sorted((frame for frame in self.frames.values() if frame.tracks), key=lambda frame: frame.source.stamp_ns)
 
+    @property
+    def length_s(self) -> float:
+        """From the first frame that the tracker has answered to the last, seconds; 0 without any."""
+        frames = self.tracked()
+        return (frames[-1].source.stamp_ns - frames[0].source.stamp_ns) / 1e9 if frames else 0.0
+
     def within(self, label: Labelled) -> list[JoinedFrame]:
         """The frames of one pointing."""
         frames = self.tracked()

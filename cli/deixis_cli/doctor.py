@@ -1,4 +1,6 @@
-"""`deixis doctor`: what is wrong with a running system and with this machine, and what to do about it. Changes nothing."""
+"""`deixis doctor`: what is wrong with a running system and with this machine, and what to do about it. Changes nothing, and
+writes nothing but the picture of --camera.
+"""
 
 from __future__ import annotations
 
@@ -60,6 +62,7 @@ def run(given: argparse.Namespace) -> int:
     """Examine the system and this machine. 1 when something is wrong. Raises CommandError."""
     if given.robot is None and not given.local:
         raise CommandError("--robot NAME is needed to look at a running system; --local looks at this machine alone")
+    _check_picture(given.camera, given.source)
     looks = camera_looks(given)
     found = [] if given.local else examine(given.connect, given.robot)
     found += examine_machine(given.source)
@@ -71,6 +74,27 @@ def run(given: argparse.Namespace) -> int:
     else:
         _print(found)
     return 1 if wrong else 0
+
+
+def _check_picture(picture: Path | None, source: str | None) -> None:
+    """Before anything is opened: only a picture is written over, and never what is looked at. Raises CommandError."""
+    if picture is None:
+        return
+    if picture.suffix.lower() != ".png":
+        raise CommandError(f"--camera {picture}: takes the name of the picture to draw, one that ends in .png")
+    if source is not None and _is_of(picture, Path(source.removeprefix("file://"))):
+        raise CommandError(f"--camera {picture}: is the --source itself, or in its folder: name another file")
+    if picture.is_dir():
+        raise CommandError(f"--camera {picture}: is a folder")
+    if not picture.parent.is_dir():
+        raise CommandError(f"--camera {picture}: there is no folder '{picture.parent}'")
+
+
+def _is_of(picture: Path, source: Path) -> bool:
+    """Whether it is that file, by whatever name, or one of that folder's pictures."""
+    if source.is_dir():
+        return picture.resolve().parent == source.resolve()
+    return picture.exists() and source.exists() and picture.samefile(source)
 
 
 def camera_looks(given: argparse.Namespace) -> list[Callable[[CameraLook], Iterable[Finding]]]:

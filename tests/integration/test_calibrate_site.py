@@ -193,6 +193,18 @@ def test_what_was_pointed_at_until_ctrl_c_counts(endpoint, robot, site, person):
     assert "4 are the fewest" in shown.text
 
 
+@pytest.mark.usefixtures("person")
+def test_ended_before_anybody_has_pointed_it_keeps_nothing_and_says_so(endpoint, robot, site, tmp_path):
+    arguments = ["--site", site, "--robot", robot, "--connect", endpoint, *STANDS, "--keep", tmp_path / "new" / "session"]
+    with terminal(*arguments) as shown:
+        assert shown.asked(0)[0]["spot"] == "A"
+        shown.type(b"\x03")
+        assert shown.end() == 130
+    assert "ended early: nobody has pointed at anything yet, and nothing is kept" in shown.text
+    assert "deixis:" not in shown.text
+    assert not (tmp_path / "new").exists()
+
+
 def test_who_does_not_point_is_not_waited_for_for_ever(endpoint, robot, site, person):
     arguments = ["--site", site, "--robot", robot, "--connect", endpoint, *STANDS[:2], "--rounds", 1, "--only", "P3,P6"]
     with terminal(*arguments) as shown:
@@ -202,8 +214,10 @@ def test_who_does_not_point_is_not_waited_for_for_ever(endpoint, robot, site, pe
     assert shown.text.count("no pointing was held") == 1
 
 
-def test_a_system_without_camera_is_refused_before_anybody_has_to_stand_there(endpoint, robot, site):
-    with terminal("--site", site, "--robot", robot, "--connect", endpoint, *STANDS) as shown:
+def test_a_system_without_camera_is_refused_before_anybody_has_to_stand_there(endpoint, robot, site, tmp_path):
+    keep = tmp_path / "session"
+    with terminal("--site", site, "--robot", robot, "--connect", endpoint, *STANDS, "--keep", keep) as shown:
         assert shown.end() == 1
+    assert not keep.exists(), "the next try may have the name"
     assert f"no camera of robot '{robot}' tells its lens" in shown.text
     assert "Stand at" not in shown.text

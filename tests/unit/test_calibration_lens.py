@@ -11,7 +11,7 @@ from deixis_calibration.board_command import sheet_of
 from deixis_calibration.boards import Board, BoardError
 from deixis_calibration.coverage import cover, hint
 from deixis_calibration.gathering import gather
-from deixis_calibration.lens_advice import advice
+from deixis_calibration.lens_advice import advice, tells_focal
 from deixis_calibration.lens_fit import LensFitError, fit_lens
 from deixis_calibration.picture_sources import Named, PictureSource
 from deixis_calibration.sightings import finder_of
@@ -139,6 +139,38 @@ def test_boards_of_one_tilt_in_the_middle_of_the_picture_are_warned_of():
     assert "edge at the left, right, top, bottom" in said
 
 
+@pytest.mark.parametrize("focal_px", [300, 400, 600, 2000])
+@pytest.mark.parametrize(
+    "places",
+    [
+        [(x, y, far, 0, 0, 0) for x in (0.25, 0.5, 0.75) for y in (0.3, 0.5, 0.7) for far in (1.5, 2.2)],
+        [(0.5, 0.5, far, 0, 0, roll) for far in (1.2, 2, 4) for roll in range(0, 60, 15)],
+        [(0.5, 0.5, 1.2, 35, 10, 0)] * 12,
+    ],
+    ids=["everywhere", "in the middle", "copies"],
+)
+def test_of_boards_of_one_tilt_no_lens_tells_its_focal_length(places, focal_px, monkeypatch):
+    monkeypatch.setattr("board_views.MATRIX", np.array([[focal_px, 0, 325.0], [0, focal_px, 236.0], [0, 0, 1]]))
+    told = []
+    for chosen in (places, VIEWS):
+        seen = sightings(CHARUCO, chosen)
+        told.append(tells_focal(fit_lens(CHARUCO, seen, "plumb_bob"), cover(CHARUCO, seen)))
+    assert told == [False, True]
+
+
+def test_a_focal_length_that_is_not_determined_is_no_success_and_no_percentage_is_stated(folder, tmp_path, capsys):
+    for number in range(12):
+        (tmp_path / f"{number}.png").write_bytes((folder / "view1.png").read_bytes())
+    assert calibrate(tmp_path, "--out", tmp_path / "lens.yaml") == 3
+    said = capsys.readouterr().out
+    assert "focal length not determined: all boards had one tilt" in said
+    assert "+-" not in said
+    assert "nearly the same tilt" in (tmp_path / "lens.yaml").read_text()
+    assert calibrate(tmp_path, "--out", tmp_path / "lens.yaml", "--force", "--json") == 3
+    document = json.loads(capsys.readouterr().out)
+    assert (document["focal_determined"], document["focal_sigma"]) == (False, None)
+
+
 def test_good_pictures_are_warned_of_only_where_they_are():
     assert advised(CHESS, sightings(CHESS)) == ""
     assert "5 pictures are few" in advised(CHESS, sightings(CHESS)[:5])
@@ -156,6 +188,32 @@ def test_a_blurred_picture_is_left_out_and_named():
     assert "do not fit the others and were left out (blurred, or the board bent): view3" in " ".join(
         advice(fit, cover(CHESS, seen))
     )
+
+
+@pytest.mark.parametrize("small", [["view0"], ["view3", "view7", "view11"]])
+def test_the_size_that_most_pictures_have_is_measured_whichever_comes_first(small, folder, tmp_path, capsys):
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for path in folder.glob("view*.png"):
+        picture = cv2.imread(str(path))
+        cv2.imwrite(str(pictures / path.name), cv2.resize(picture, (480, 360)) if path.stem in small else picture)
+    assert calibrate(pictures, "--out", tmp_path / "lens.yaml") == 0
+    assert (load_calibration(tmp_path / "lens.yaml").width, load_calibration(tmp_path / "lens.yaml").height) == SIZE
+    said = capsys.readouterr().out
+    assert f"{len(small)} of them: of 480 x 360 pixels, most of 640 x 480: a lens is measured at one size (view" in said
+    assert f"over {12 - len(small)} pictures" in said
+
+
+def test_of_as_many_pictures_of_two_sizes_the_larger_are_measured():
+    album = Album(CHESS, only_new=False, only_still=False)
+    seen = sightings(CHESS)
+    for one in seen[:3]:
+        album.add(one.name, type(one)(f"small {one.name}", (320, 240), one.ids, one.px / 2))
+    assert len(album.kept) == 3
+    for one in seen[3:6]:
+        album.add(one.name, one)
+    assert [one.name for one in album.kept] == ["view3", "view4", "view5"]
+    assert list(album.refused) == ["small view0", "small view1", "small view2"]
 
 
 def test_pictures_of_two_sizes_are_no_lens():

@@ -134,6 +134,33 @@ def test_doctor_says_where_there_is_nothing_to_look_at(tmp_path, capsys):
     assert "camera: nothing to look at: " in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("source", "picture", "said"),
+    [
+        ("v.mp4", "v.mp4", "v.mp4: takes the name of the picture to draw, one that ends in .png"),
+        ("v.mp4", "README.md", "README.md: takes the name of the picture to draw"),
+        ("v.png", "v.png", "v.png: is the --source itself"),
+        ("v.png", "link.png", "link.png: is the --source itself"),
+        ("v.mp4", "hard.png", "hard.png: is the --source itself"),
+        ("pictures.png", "pictures.png/1.png", "pictures.png/1.png: is the --source itself, or in its folder"),
+        ("v.mp4", "nodir/s.png", "nodir/s.png: there is no folder 'nodir'"),
+        ("v.mp4", "pictures.png", "pictures.png: is a folder"),
+    ],
+)
+def test_doctor_draws_over_no_file_but_an_earlier_picture(source, picture, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("v.mp4", "v.png", "README.md"):
+        (tmp_path / name).write_text("dear to somebody")
+    (tmp_path / "link.png").symlink_to("v.png")
+    (tmp_path / "hard.png").hardlink_to("v.mp4")
+    (tmp_path / "pictures.png").mkdir()
+    assert main(["doctor", "--local", "--source", source, "--camera", picture]) == 1
+    heard = capsys.readouterr()
+    assert (heard.out, heard.err.count("\n")) == ("", 1)
+    assert said in heard.err
+    assert {(tmp_path / name).read_text() for name in ("v.mp4", "v.png", "README.md")} == {"dear to somebody"}
+
+
 def messages(seq):
     frame = Frame(
         run=1, seq=seq, stamp_ns=seq, stage="camera", instance="c", width=2, height=2, encoding="mono8", data=bytes(4)

@@ -228,6 +228,27 @@ def test_labels_that_name_no_spot_are_refused_by_field(session, tmp_path, capsys
     assert "pointings.2.spot: 'Z' is none of the spots" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("shift_s", "first", "said"),
+    [
+        (900, 0, "pointings.0: the labels lie after the recording's end: from 900 s on, where"),
+        (900, 23, "pointings.23: the labels lie after the recording's end"),
+        (0, 24, "pointings: there are none"),
+    ],
+)
+def test_labels_of_another_recording_or_of_nothing_are_refused(session, shift_s, first, said, tmp_path, capsys):
+    labels = json.loads((session / "labels.yaml").read_text())
+    labels["pointings"] = [] if first == 24 else labels["pointings"]
+    for pointing in labels["pointings"][first:]:
+        pointing["from_s"] += shift_s
+        pointing["to_s"] += shift_s
+    (tmp_path / "labels.yaml").write_text(json.dumps(labels))
+    assert calibrate(session, "--labels", tmp_path / "labels.yaml") == 1
+    heard = capsys.readouterr()
+    assert (heard.out, heard.err.count("\n")) == ("", 1)
+    assert said in heard.err
+
+
 def test_no_pointing_is_judged_by_tables_and_a_mount_that_it_helped_to_make(session, monkeypatch, capsys):
     tables, mounts = [], []
 
