@@ -88,7 +88,7 @@ def test_a_click_adds_a_poi_a_drag_moves_it_and_both_are_in_the_registry(page, b
     page.type_into("[name=name]", "the globe's twin")
     page.type_into("[name=z]", "far")
     page.press("#save")
-    page.wait_for("document.querySelector('#message').textContent.startsWith('not saved: position_m.2')")
+    page.wait_for("document.querySelector('#message').textContent.startsWith('not saved: Height: \"far\" is no number')")
     assert page.run("document.querySelector('[name=z]').getAttribute('aria-invalid')") == "true"
     assert "P11" not in stored(bench)
     page.type_into("[name=z]", "1.25")
@@ -101,6 +101,36 @@ def test_a_click_adds_a_poi_a_drag_moves_it_and_both_are_in_the_registry(page, b
     page.wait_for("document.querySelector('[name=x]').value.startsWith('3')")
     page.wait_for("document.querySelector('#message').textContent.startsWith('saved')")
     assert stored(bench)["P11"].position_m == pytest.approx([3.0, -1.0, 1.25], abs=0.05)
+    assert page.errors == []
+
+
+@needs_chromium
+def test_a_comma_in_a_number_is_read_and_what_is_no_number_is_refused_by_its_label(page, bench):
+    before = stored(bench)["P2"]
+    page.press("#pois button[title='P2']")
+    for field, typed, said in (
+        ("x", "1,2,3", 'x: "1,2,3" is no number'),
+        ("y", "2m", 'y: "2m" is no number'),
+        ("z", "", 'Height: "" is no number'),
+        ("z", "1e1", 'Height: "1e1" is no number'),
+        ("extent_m", "-1", "Size across (extent_m): "),
+        ("x", "100001", "x (position_m.0): "),
+    ):
+        kept = page.run(f"document.querySelector('[name={field}]').value")
+        page.type_into(f"[name={field}]", typed)
+        page.press("#save")
+        page.wait_for(f"document.querySelector('#message').textContent.startsWith({json.dumps('not saved: ' + said)})")
+        assert page.run(f"document.querySelector('[name={field}]').getAttribute('aria-invalid')") == "true"
+        assert stored(bench)["P2"] == before
+        page.type_into(f"[name={field}]", kept)
+    page.type_into("[name=x]", "2,5")
+    page.type_into("[name=extent_m]", ",25")
+    page.press("#save")
+    page.wait_for("document.querySelector('#message').textContent.startsWith('saved')")
+    after = stored(bench)["P2"]
+    assert (after.position_m, after.extent_m) == ((2.5, *before.position_m[1:]), 0.25)
+    assert page.run("document.querySelector('[name=x]').value") == "2.5"
+    page.press("#cancel")
     assert page.errors == []
 
 

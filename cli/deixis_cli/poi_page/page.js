@@ -7,6 +7,7 @@ const ANSWER_WITHIN_MS = 20000;
 const MOST_ROWS = 300;
 const MOST_UNDONE = 50;
 const FIELDS = ["poi_id", "name", "x", "y", "z", "extent_m", "tags"];
+const NUMBERS = ["x", "y", "z", "extent_m"];
 const OF_SERVER = { "position_m": "x", "position_m.0": "x", "position_m.1": "y", "position_m.2": "z" };
 
 const token = new URLSearchParams(location.hash.slice(1)).get("token") || "";
@@ -117,7 +118,26 @@ function valuesOf(poi) {
 }
 
 const plain = (number) => String(Math.round(number * 1000) / 1000);
-const number = (text) => (text.trim() === "" ? null : Number(text));
+const labelOf = (field) => form.elements[field].labels[0].firstChild.textContent.trim();
+
+// With a point or a comma before the decimals; null for all that is no such number.
+function number(text) {
+  const decimal = text.trim().replace(",", ".");
+  return /^[+-]?(\d+\.?\d*|\.\d+)$/.test(decimal) ? Number(decimal) : null;
+}
+
+// The first field with something else than a number in it, where one is needed.
+function noNumber({ values, base }) {
+  const stored = base ? valuesOf(base) : {};
+  return NUMBERS.find((field) => values[field] !== stored[field] && number(values[field]) === null);
+}
+
+function refusalOf(error) {
+  const field = OF_SERVER[error.field] || error.field.split(".")[0];
+  const label = FIELDS.includes(field) ? labelOf(field) : "";
+  const named = error.field && error.message.startsWith(`${error.field}: `) ? error.message.slice(error.field.length + 2) : error.message;
+  return { field, error: `not saved: ${label ? `${label} (${error.field}): ${named}` : error.message}` };
+}
 
 // Numbers that were not touched stay as exact as they are stored.
 function poiOf({ values, base }) {
@@ -165,6 +185,12 @@ function fillForm() {
 async function save() {
   const mine = draft;
   if (!mine || mine.saving || !changed()) return;
+  const wrong = noNumber(mine);
+  if (wrong) {
+    Object.assign(mine, { note: "", field: wrong, error: `not saved: ${labelOf(wrong)}: "${mine.values[wrong].trim()}" is no number, such as 1.25` });
+    showAll();
+    return;
+  }
   const poi = poiOf(mine), sent = JSON.stringify(mine.values);
   Object.assign(mine, { saving: true, error: "", field: "", note: "saving" });
   showAll();
@@ -178,7 +204,7 @@ async function save() {
     mine.saving = false;
     if (draft === mine) more ? showAll() : fillForm();
   } catch (error) {
-    Object.assign(mine, { saving: false, note: "", error: `not saved: ${error.message}`, field: OF_SERVER[error.field] || error.field.split(".")[0] });
+    Object.assign(mine, { saving: false, note: "", ...refusalOf(error) });
     if (draft !== mine) draft = mine; // what was typed is never lost in silence
     fillForm();
   }
@@ -386,10 +412,10 @@ function marks() {
   const all = [];
   for (const poi of pois.values()) if (!draft?.base || poi.poi_id !== draft.base.poi_id) all.push(markOf(poi));
   if (!draft) return all;
-  const { values, base } = draft, place = [Number(values.x), Number(values.y)];
+  const { values, base } = draft, place = ["x", "y"].map((field, axis) => number(values[field]) ?? base?.position_m[axis] ?? 0);
   const moved = base && Math.hypot(place[0] - base.position_m[0], place[1] - base.position_m[1]) > 0.002;
   const name = values.name.trim() || values.poi_id;
-  all.push({ poi: base, place, extent: Number(values.extent_m), name, chosen: true, unsaved: changed(), from: moved ? base.position_m : null });
+  all.push({ poi: base, place, extent: number(values.extent_m) ?? base?.extent_m ?? 0, name, chosen: true, unsaved: changed(), from: moved ? base.position_m : null });
   return all;
 }
 
