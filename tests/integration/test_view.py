@@ -231,6 +231,18 @@ def test_a_viewer_that_is_stopped_is_left_out_and_takes_part_again_when_it_goes_
 
 
 @needs_rerun
+def test_a_viewer_that_is_killed_is_said_in_one_sentence(run, tmp_path):
+    log = tmp_path / "log"
+    with process(command("deixis", "view", run / "pointing.mcap", "--web", "--port", 0), log) as child:
+        wait_until(lambda: "times drawn" in log.read_text(), "it is drawn", LOADED_S, log)
+        (viewer,) = children(child.pid)
+        os.kill(viewer, signal.SIGKILL)
+        assert child.wait(30) == 1
+    _address, _drawn, *said = log.read_text().splitlines()
+    assert said == ["deixis: Rerun's viewer was ended by signal 9 (Killed)"]
+
+
+@needs_rerun
 def test_the_viewer_ends_with_a_command_that_is_killed(run, tmp_path):
     log = tmp_path / "log"
     with process(command("deixis", "view", run / "pointing.mcap", "--web", "--port", 0), log) as child:
@@ -318,7 +330,8 @@ def test_a_port_that_is_taken_is_said_in_one_line_and_no_viewer_is_started(run, 
         port = taken.getsockname()[1]
         assert main(["view", str(run / "pointing.mcap"), "--web", "--port", str(port)]) == 1
     said = capsys.readouterr()
-    assert (said.out, said.err) == ("", f"deixis: --port {port}: Address already in use\n")
+    advice = "another viewer may be running there: --port N takes another port, 0 a free one"
+    assert (said.out, said.err) == ("", f"deixis: --port {port}: Address already in use; {advice}\n")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -31,7 +31,7 @@ from rich.console import Console
 from .drawer import Drawer, Painter
 from .feed import Feed
 from .hearing import hear, keys_of
-from .installed import SinkError, check_installed, new_sink, sink_for_file
+from .installed import SinkError, check_installed, leave_viewer_to_us, new_sink, sink_for_file
 from .options import add_draw_options, draw_options, known_place, scene_of
 from .recording import messages, paint_all
 from .scene import Scene
@@ -155,6 +155,7 @@ def _sink(given: argparse.Namespace) -> Iterator[tuple[ViewerProcess | None, Any
     with ExitStack() as stack:
         # Its port first: where that is taken, no viewer is started and no second is lost.
         page = stack.enter_context(WebPage(given.port, viewer.web_port, viewer.url)) if given.web else None
+        leave_viewer_to_us()
         sink = new_sink(name, live=given.file is None)
         stack.enter_context(viewer)
         if page is not None:

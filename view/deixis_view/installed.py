@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,11 @@ def check_installed() -> None:
     """Raises CommandError where Rerun is not installed."""
     if find_spec("rerun") is None:
         raise CommandError(MISSING)
+
+
+def leave_viewer_to_us() -> None:
+    """Have the library say nothing of a viewer that is gone, which we say: it does so several times over. Before any sink."""
+    os.environ.setdefault("RUST_LOG", "warn,re_grpc_client=off,re_sdk::recording_stream=off")
 
 
 def new_sink(name: str, *, live: bool) -> RerunSink:

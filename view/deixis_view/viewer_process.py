@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -24,6 +25,10 @@ START_S = 20.0
 STOP_S = 3.0
 MEMORY = "512MiB"
 """Of what is kept for who looks back, or on from now; the oldest is dropped."""
+
+
+# `2026-11-28T14:16:07.597519Z  INFO re_grpc_server: Listening ...`
+AT_EASE = re.compile(r"\S+Z +(INFO|DEBUG|TRACE) ")
 
 
 class ViewerError(RuntimeError):
@@ -93,7 +98,11 @@ class ViewerProcess:
     def failure(self) -> str:
         """Why it ended, where that was no end in good order."""
         status = self._child.poll()
-        return "" if status in (None, 0) else f"Rerun's viewer has ended with status {status}: {self._last_words()}"
+        if status is None or status == 0:
+            return ""
+        if status < 0:
+            return f"Rerun's viewer was ended by signal {-status} ({signal.strsignal(-status) or 'unknown'})"
+        return f"Rerun's viewer has ended with status {status}: {self._last_words()}"
 
     def _await_all(self) -> None:
         for port in (self.port,) if self._window else (self.port, self.web_port):
@@ -126,8 +135,13 @@ class ViewerProcess:
         return self._folder / "rerun.log"
 
     def _last_words(self) -> str:
-        lines = self._log().read_text(errors="replace").strip().splitlines()
-        return " ".join(lines[-3:])[-600:] or "it said nothing"
+        return last_words(self._log().read_text(errors="replace"))
+
+
+def last_words(log: str) -> str:
+    """What a viewer's log has last to say of what went wrong; not what it tells when all is well."""
+    lines = [line for line in log.splitlines() if line.strip() and not AT_EASE.match(line)]
+    return " ".join(lines[-3:])[-600:] or "it did not say why"
 
 
 def has_display() -> bool:

@@ -5,6 +5,7 @@ By itself it asks for fonts, news and examples of the internet and reports its u
 
 from __future__ import annotations
 
+import errno
 import http.client
 import shutil
 import threading
@@ -29,7 +30,7 @@ class WebPage:
         try:
             self._server = ThreadingHTTPServer((LOOPBACK, port), handler)
         except OSError as error:
-            raise ViewerError(f"--port {port}: {error.strerror}") from None
+            raise ViewerError(f"--port {port}: {error.strerror}{_advice(error)}") from None
         self._server.daemon_threads = True
         self.url = f"http://{LOOPBACK}:{self._server.server_address[1]}/"
         self._thread = threading.Thread(target=self._server.serve_forever, name="web", daemon=True)
@@ -41,6 +42,11 @@ class WebPage:
     def __exit__(self, *_: object) -> None:
         self._server.shutdown()
         self._server.server_close()
+
+
+def _advice(error: OSError) -> str:
+    taken = error.errno == errno.EADDRINUSE
+    return "; another viewer may be running there: --port N takes another port, 0 a free one" if taken else ""
 
 
 def policy(viewer_url: str) -> str:
