@@ -91,7 +91,7 @@ contract: setup
 pages: setup
 	@$(BIN)/python docs/make_reference.py
 
-# The pages as a site in build/docs, to be read with a browser or served from anywhere
+# The pages as a site in build/docs, to be opened with a browser, or served from anywhere, which gives a search, too
 docs: setup
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir build/docs && echo "build/docs/index.html"
 

@@ -315,8 +315,10 @@ def test_a_view_that_is_refused_leaves_the_file_that_was_there_and_makes_no_new_
 def test_a_run_that_does_not_start_leaves_the_drawing_that_was_there(tmp_path):
     out = tmp_path / "out.rrd"
     out.write_bytes(b"drawn before")
-    argv = command("deixis", "run", tmp_path / "none.mp4", "--robot", "test-none", "--view", out)
-    done = subprocess.run(argv, capture_output=True, text=True, timeout=60, check=False)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        listen = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        argv = command("deixis", "run", CLIP, "--robot", "test-none", "--listen", listen, "--view", out)
+        done = subprocess.run(argv, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 1, done.stderr
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("out.rrd", b"drawn before")]
 
