@@ -25,7 +25,7 @@ DEFECTS = (
         "answers_the_old",
         "ignores_sigterm",
     ),
-    *("ends_at_once", "chatters"),
+    *("ends_at_once", "chatters", "crashes"),
 )
 MAX_AGE_NS = 1_000_000_000
 
@@ -58,6 +58,8 @@ class Stage:
             return
         if self.defect == "works_off_a_queue":
             time.sleep(0.06)
+        if self.defect == "crashes":
+            raise ValueError("there is no model for this hand")
         found = Gestures.derive(tracks, self.producer, gestures=[])
         self.put(topics.GESTURES, found, **({"gestures": [{"person_id": "one"}]} if self.defect == "broken_field" else {}))
         if self.defect == "twice":

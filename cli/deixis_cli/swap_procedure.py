@@ -134,6 +134,9 @@ class SwapProcedure:
         who = newcomer.instance or "the newcomer"
         if isinstance(newcomer, GivenNewcomer):
             self._say_if_absent(who)
+        elif newcomer.ours:
+            whose = f"{self._stage} of robot '{self._robot}'"
+            self._advise(f"waiting for the newcomer to stand by for {whose}, {START_WITHIN_S:g} s at most")
         return self._await(found, newcomer, START_WITHIN_S, f"{who} does not stand by", LOOK_S)
 
     def _say_if_absent(self, instance: str) -> None:

@@ -211,6 +211,9 @@ def _token_advice(stage: str) -> str:
 
 
 def _ends(exam: Examination, subject: Subject) -> list[Result]:
+    if not subject.running():
+        said = f"it ended by itself with status {subject.status()} meanwhile: {subject.last_words() or 'without a word'}"
+        return [Result("ends", "failed", said, "mend this first: what else is wrong may come of it")]
     took_s = subject.terminate()
     advice = f"end within {STOP_WITHIN_S:g} s of SIGTERM with status 0: a robot that is shut down waits for nobody"
     if took_s is None:

@@ -28,6 +28,7 @@ FOUND_OUT = {
     "answers_the_old": {"age"},
     "ignores_sigterm": {"ends"},
     "chatters": {"silence"},
+    "crashes": {"answers", "ends"},
 }
 
 
@@ -66,6 +67,9 @@ def test_a_stage_with_one_defect_fails_the_check_that_is_for_it(of_broken, defec
 def test_what_is_found_names_the_cause(of_broken):
     assert "gestures.0.person_id" in failed(of_broken["broken_field"])["schema"]["found"]
     assert "expected 'application/msgpack;Gestures/" in failed(of_broken["no_label"])["labels"]["found"]
+    crashed = failed(of_broken["crashes"])["ends"]["found"]
+    assert "it ended by itself with status 1" in crashed
+    assert "there is no model for this hand" in crashed
 
 
 def test_our_own_stages_and_the_shortest_example_keep_the_contract():
