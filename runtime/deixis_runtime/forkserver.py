@@ -24,7 +24,7 @@ from typing import Any
 
 from setproctitle import setproctitle
 
-from .memory import let_go_of_libraries, settle
+from .memory import settle
 from .session import exit_now
 
 EXIT_FAULT = 1
@@ -41,7 +41,6 @@ def main() -> int:
         failed["*"] = f"what they import has started {threads - 1} threads"
         loaded = {}
     settle()
-    let_go_of_libraries()
     asked.send(json.dumps({"loaded": list(loaded), "failed": failed}).encode())
     while True:
         request, go, _, _ = socket.recv_fds(asked, MAX_REQUEST, 1)

@@ -16,7 +16,7 @@ from .seen import Picture, Point
 
 Grey = NDArray[np.uint8]
 WIDEST_PX = 320
-"""Pictures are compared at this width: a quarter of the time at VGA, and motion is still told to a tenth of a pixel."""
+"""Pictures are compared at this width, which is quicker than at their own."""
 CORNERS, QUALITY, APART_PX = 80, 0.02, 6
 WINDOW, LEVELS = (11, 11), 2
 AGREE_PX, LEAST_CORNERS, LEAST_SHARE = 0.6, 8, 0.5
