@@ -92,12 +92,12 @@ class TestGetting:
 
         return run
 
-    def test_state_says_what_fusion_knows_and_who_told_it(self, get, running):
+    def test_state_says_what_fusion_knows_and_who_told_it(self, get):
         (state,) = get("fusion/state")
         assert state["robot"] == ROBOT
         producers = {source["stage"]: source["producers"] for source in state["sources"]}
         assert {stage: producers[stage] for stage in ("tracker", "headpose", "gesture")} == {
-            stage: [f"{stage}/{running.health(stage)['instance']}"] for stage in ("tracker", "headpose", "gesture")
+            stage: [f"{stage}/lockstep"] for stage in ("tracker", "headpose", "gesture")
         }
         assert state["recent_targets"][0]["final"] is True
 
