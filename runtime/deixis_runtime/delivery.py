@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import zenoh
-from deixis_schemas.topics import Delivery
+from deixis_schemas.topics import SENT, Delivery
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,7 @@ class Profile:
     express: bool
 
 
-# All drop rather than block: one frozen subscriber of a blocking publisher holds put for 5 s, loses its link and starves
-# the healthy ones. What has to last ("keep") is held by its producer and answered to a get.
 PROFILES: dict[Delivery, Profile] = {
-    Delivery.BULK_NEWEST: Profile(zenoh.Priority.DATA_LOW, express=False),
-    Delivery.NEWEST: Profile(zenoh.Priority.DATA_HIGH, express=True),
-    Delivery.KEEP: Profile(zenoh.Priority.INTERACTIVE_HIGH, express=True),
-    Delivery.KEEP_URGENT: Profile(zenoh.Priority.INTERACTIVE_HIGH, express=True),
-    Delivery.REPLY: Profile(zenoh.Priority.INTERACTIVE_HIGH, express=True),
+    stance: Profile(getattr(zenoh.Priority, sent.priority), sent.express) for stance, sent in SENT.items()
 }
 GET_PRIORITY = zenoh.Priority.INTERACTIVE_HIGH

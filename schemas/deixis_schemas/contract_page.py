@@ -7,7 +7,7 @@ from typing import Any
 
 from .messages import TYPES, Message
 from .schema_words import default_of, link, what
-from .topics import INPUTS, STAGES, SWAPPABLE, TOPICS, Topic, alive_key, standby_alive_key, standby_key
+from .topics import INPUTS, SENT, STAGES, SWAPPABLE, TOPICS, Topic, alive_key, standby_alive_key, standby_key
 
 INTRODUCTION = """# The contract
 
@@ -87,10 +87,20 @@ def _topics() -> Iterator[str]:
             f"| `{topic.path}` | {link(_name(topic))} | {_when(topic)} | {by_get} | {_size(topic.max_bytes)} | {oldest} "
             f"| {topic.delivery.value} |"
         )
+    yield from _deliveries()
     yield "\nWhat it means when nothing comes:\n"
     for topic in TOPICS:
         yield f"* `{topic.path}`: {topic.silence}"
     yield ""
+
+
+def _deliveries() -> Iterator[str]:
+    yield "\nWhat a delivery is in Zenoh (of `reply`: what gets ask with). Congestion control is `DROP` (`BLOCK` where `camera/info`"
+    yield "says `lockstep`), reliability is left as it is; who keeps something answers a get on its key with the last one:\n"
+    yield "| delivery | priority | express |"
+    yield "|---|---|---|"
+    for stance, sent in SENT.items():
+        yield f"| {stance.value.partition(':')[0]} | `{sent.priority}` | {'yes' if sent.express else 'no'} |"
 
 
 def _stages() -> Iterator[str]:

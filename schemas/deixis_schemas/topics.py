@@ -12,13 +12,32 @@ from . import messages as m
 
 
 class Delivery(Enum):
-    """How a topic is delivered, named for its stance; the runtime gives each its Zenoh settings."""
+    """How a topic is delivered, named for its stance; what each is in Zenoh says SENT."""
 
     BULK_NEWEST = "bulk, newest wins: frames; dropped first when the link is full"
     NEWEST = "newest wins: small and perishable; dropped when late"
     KEEP = "keep: few, and the last one is answered to a get"
     KEEP_URGENT = "keep, high priority: answers that people wait for"
     REPLY = "reply: answered to a get only"
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What a stance is in Zenoh. priority: by its name there. express: sent at once, not gathered into batches."""
+
+    priority: str
+    express: bool
+
+
+# All drop rather than block: one frozen subscriber of a blocking publisher holds put for 5 s, loses its link and starves
+# the healthy ones. What has to last ("keep") is held by its producer and answered to a get.
+SENT: dict[Delivery, Sent] = {
+    Delivery.BULK_NEWEST: Sent("DATA_LOW", express=False),
+    Delivery.NEWEST: Sent("DATA_HIGH", express=True),
+    Delivery.KEEP: Sent("INTERACTIVE_HIGH", express=True),
+    Delivery.KEEP_URGENT: Sent("INTERACTIVE_HIGH", express=True),
+    Delivery.REPLY: Sent("INTERACTIVE_HIGH", express=True),
+}
 
 
 class By(Enum):
