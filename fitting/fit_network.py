@@ -43,8 +43,9 @@ class Network(nn.Module):  # type: ignore[misc]  # where PyTorch is not installe
 class Fit:
     """A network while it is fitted."""
 
-    def __init__(self, start: Path | None = None, pixels: NDArray[np.uint8] | None = None) -> None:
+    def __init__(self, start: Path | None = None, pixels: NDArray[np.uint8] | None = None, rate: float = RATE) -> None:
         """Begin anew; or go on from a checkpoint (.pt), or from weights of the stage (.npz) with some crops as they come."""
+        self._rate = rate
         self._network = Network().to(memory_format=torch.channels_last)
         if start is not None and start.suffix == ".npz":
             if pixels is None:
@@ -53,13 +54,13 @@ class Fit:
         elif start is not None:
             self._network.load_state_dict(torch.load(start))
         self._mean = {name: values.clone() for name, values in self._network.state_dict().items()}
-        self._optimiser = torch.optim.AdamW(self._network.parameters(), lr=RATE, weight_decay=1e-3)
+        self._optimiser = torch.optim.AdamW(self._network.parameters(), lr=rate, weight_decay=1e-3)
         self._steps = 0
 
     def step(self, crops: Crops, share: float) -> float:
         """Learn from a batch; `share` of the training is done. Gives the loss."""
         for group in self._optimiser.param_groups:
-            group["lr"] = RATE * min(1, (self._steps + 1) / WARM_STEPS) * (0.5 * (1 + math.cos(math.pi * share)) + 0.005)
+            group["lr"] = self._rate * min(1, (self._steps + 1) / WARM_STEPS) * (0.5 * (1 + math.cos(math.pi * share)) + 0.005)
         self._network.train()
         loss = loss_of(self._network(_tensor(crops.pixels)), crops)
         self._optimiser.zero_grad()

@@ -1,6 +1,6 @@
 """Fits the regression of head pose (`deixis_headpose/regression.npz`) on portraits that the simulator renders.
 
-usage: python fitting/fit_regression.py [--portraits N] [--minutes M] [--cache DIR] [--from FILE] [--out FILE]
+usage: python fitting/fit_regression.py [--portraits N] [--minutes M] [--rate R] [--cache DIR] [--from FILE] [--out FILE]
 
 Portraits are of the simulator's fitting people alone (seeds below 1000); at the end the errors on the people who were held
 out are printed, which choose nothing here. Needs PyTorch, which Deixis itself does not: `pip install torch`. Two cores render
@@ -41,6 +41,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--portraits", type=int, default=20000, help="of fitting people (default: 20000)")
     parser.add_argument("--minutes", type=float, default=60.0, help="of training (default: 60)")
+    parser.add_argument("--rate", type=float, default=1.5e-3, help="learning rate to begin with (default: .0015)")
     parser.add_argument(
         "--cache",
         type=Path,
@@ -60,7 +61,7 @@ def main() -> int:
     fitting = render(given.cache, list(FITTING_SEEDS)[:count], PART)
     held_out = render(given.cache, [HELD_OUT_SEED], PART)
     with CropMaker(fitting) as maker:
-        fit = Fit(given.start, np.concatenate([maker.take().pixels for _ in range(8)]))
+        fit = Fit(given.start, np.concatenate([maker.take().pixels for _ in range(8)]), given.rate)
         train(fit, maker, given.minutes, given.cache / "checkpoint.pt")
     fit.export(given.out)
     print_errors(fit, Portraits.load(held_out))

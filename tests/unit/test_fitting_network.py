@@ -29,3 +29,21 @@ def test_the_stage_reads_what_the_fitted_network_says(tmp_path: Path) -> None:
     assert said == pytest.approx(fit.noses(pixels), abs=0.02)
     again = Fit(tmp_path / "weights.npz", pixels)
     assert again.noses(pixels) == pytest.approx(fit.noses(pixels), abs=0.02)
+
+
+def test_mixed_weights_lie_between_both() -> None:
+    from mean_weights import mean_of
+
+    first, second = {"a_w": np.array([0.0, 4.0], np.float16)}, {"a_w": np.array([8.0, 0.0], np.float16)}
+    mixed = mean_of(first, second, 0.25)["a_w"]
+    assert mixed.tolist() == [2.0, 3.0]
+    assert mixed.dtype == np.float16
+
+
+def test_weights_of_two_networks_are_not_mixed() -> None:
+    from mean_weights import mean_of
+
+    with pytest.raises(ValueError, match="not weights of the same network"):
+        mean_of({"a_w": np.zeros(2)}, {"a_w": np.zeros(3)}, 0.5)
+    with pytest.raises(ValueError, match=r"--share 1.5"):
+        mean_of({"a_w": np.zeros(2)}, {"a_w": np.zeros(2)}, 1.5)
