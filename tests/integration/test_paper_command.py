@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pty
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -105,3 +109,22 @@ def test_what_cannot_be_is_refused_and_said(
     became, said = refused(capsys, "paper", "--trials", "10", *arguments)
     assert became == status
     assert complaint in said
+
+
+def test_a_terminal_is_shown_how_far_the_trials_are_and_nothing_else_is() -> None:
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    shown = []
+    with subprocess.Popen(
+        [DEIXIS, "paper", "--trials", "30000"], stdout=subprocess.DEVNULL, stderr=theirs, env=environment
+    ) as process:
+        os.close(theirs)
+        with os.fdopen(ours, "rb", buffering=0) as screen, contextlib.suppress(OSError):  # EIO: nobody writes there any more
+            while part := screen.read(65536):
+                shown.append(part)
+    assert process.returncode == 0
+    counted = {int(count) for count in re.findall(rb"(\d+)/90000", b"".join(shown))}
+    assert len(counted) >= 3, "the bar moves"
+    assert max(counted) == 90000
+    piped = paper("--trials", "3000")
+    assert "/9000" not in piped.stderr
