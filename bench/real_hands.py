@@ -1,4 +1,5 @@
-"""Hands of real and of rendered people: how much skin is told from the rest, and whether a single finger is seen as one.
+"""Hands of real and of rendered people: how much skin is told from the rest, whether a single finger is seen as one, and
+whether an index finger alone is called that.
 
 Skin is judged by the prior alone, for pictures of hands hold no face to adapt to. Fingers are counted on the true outline of
 the hand where there is one (hgr1, rendered clips), else on what differs from the colours around the labelled box (hands).
@@ -19,9 +20,12 @@ from deixis_evaluation.clips import Clip, TruePerson
 from deixis_evaluation.replay import Picture
 from deixis_evaluation.true_tracks import PART_BITS, PARTS, PERSON_SHIFT, LabelPictures, label_pictures_of
 from deixis_gesture.fingertips import find_fingers
-from deixis_gesture.hand import hand_of
+from deixis_gesture.hand import CHEST, HandShape, hand_of
+from deixis_gesture.hand_posture import posture_of
 from deixis_gesture.rules import POINTING_FINGER
+from deixis_schemas.anatomy import FACE_WIDTH_M, HEAD_WIDTH_M
 from deixis_tracker.config import TrackerConfig
+from deixis_tracker.hands import cut_hand
 from deixis_tracker.skin import SkinModel
 from numpy.typing import NDArray
 from real_heads import pictures_of
@@ -31,11 +35,14 @@ T = TypeVar("T")
 
 # No face gives the scale of a lone hand: fists and palms are about so wide (radius, face widths; see deixis_gesture.bearing).
 PALM_RADIUS = 0.25
-# A lone hand stands upright above the chest.
-RAISED = (0.0, -1.5)
+# An arm's length from the chest to the palm: how far out does not matter for the outline. A boxed hand stands upright.
+REACH = 3.0
+RAISED = (CHEST[0], CHEST[1] - REACH)
+BORDER_PX = 2
 HGR_INDEX_ALONE = ("Z", "D")
 """Signs of hgr1 that extend the index finger alone. All others count as other hands: of the digits 2 to 5 alone, as it was
-counted once, none is taken for an index; of all signs a third are."""
+counted once, none is taken for an index; of all signs a third are. One of them is I, the little finger alone: its outline is
+that of an index finger of the other hand, or from the other side."""
 CUT_ROUNDS, CUT_MARGIN, CUT_SIDE_PX = 4, 0.4, 160
 """A boxed hand is cut out (GrabCut) in so many rounds, with so much around its box, sides, in a picture of so many pixels."""
 OPEN_HANDS = ("wave", "stop")
@@ -57,6 +64,9 @@ class Hands:
     single_seen: int = 0
     others: int = 0
     others_as_single: int = 0
+    single_named: int = 0
+    others_named_single: int = 0
+    unknown: int = 0
 
     def count_skin(self, called: NDArray[np.bool_], skin: NDArray[np.bool_], background: NDArray[np.bool_]) -> None:
         """One picture (h, w): what was called skin, what is skin, and what surely is not."""
@@ -65,14 +75,18 @@ class Hands:
         self.background += int(background.sum())
         self.background_taken += int((called & background).sum())
 
-    def count_fingers(self, *, alone: bool, found: int) -> None:
-        """One hand, whether it extends the index finger alone, and how many fingers were found."""
+    def count_hand(self, hand: HandShape | None, *, alone: bool) -> None:
+        """One hand, and whether it extends the index finger alone: how many fingers stand out, and what it is called."""
+        found, posture = fingers_of(hand), "unknown" if hand is None else posture_of(hand).named
+        self.unknown += posture == "unknown"
         if alone:
             self.single += 1
             self.single_seen += found == 1
+            self.single_named += posture == "index"
         else:
             self.others += 1
             self.others_as_single += found == 1
+            self.others_named_single += posture == "index"
 
     def figures(self) -> dict[str, float | None]:
         """The columns of the table."""
@@ -85,6 +99,9 @@ class Hands:
             "other_hands": float(self.others),
             "others_seen_as_one_finger_share": _share(self.others_as_single, self.others),
             "one_finger_precision": _share(self.single_seen, self.single_seen + self.others_as_single),
+            "index_named_share": _share(self.single_named, self.single),
+            "index_named_precision": _share(self.single_named, self.single_named + self.others_named_single),
+            "posture_unknown_share": _share(self.unknown, self.single + self.others),
         }
 
 
@@ -98,7 +115,7 @@ def hgr1(folder: Path, sample: int) -> Hands:
         hands.pictures += 1
         hands.count_skin(called_skin(np.asarray(picture, np.uint8)), truth > 127, truth <= 127)
         alone = path.name.split("_", 1)[0] in HGR_INDEX_ALONE
-        hands.count_fingers(alone=alone, found=fingers_of(np.asarray(truth > 127, np.uint8), RAISED))
+        hands.count_hand(lone_hand(np.asarray(truth > 127, np.uint8)), alone=alone)
     return hands
 
 
@@ -111,8 +128,7 @@ def boxed(folder: Path, sample: int) -> Hands:
             raise ValueError(f"'{path}' has no picture")
         hands.pictures += 1
         for extended, box in _boxes(path):
-            found = fingers_of(cut_out(np.asarray(picture, np.uint8), box), RAISED)
-            hands.count_fingers(alone=extended == 1, found=found)
+            hands.count_hand(hand_on(cut_out(np.asarray(picture, np.uint8), box), RAISED), alone=extended == 1)
     return hands
 
 
@@ -161,7 +177,7 @@ def _count_rendered(hands: Hands, picture: Picture, parts: Mask, persons: Sequen
             continue
         own = np.asarray((part == PARTS[side]) & (parts >> PERSON_SHIFT == person.id), np.uint8)
         if own.any():
-            hands.count_fingers(alone=person.points, found=fingers_of(own, _place(person, own)))
+            hands.count_hand(hand_on(own, _place(person, own)), alone=person.points)
 
 
 def sampled(items: Sequence[T], sample: int) -> list[T]:
@@ -176,20 +192,65 @@ def called_skin(picture: Picture) -> NDArray[np.bool_]:
     return np.asarray(SkinModel(config.prior_skin).probability(picture) >= config.skin_low, np.bool_)
 
 
-def fingers_of(mask: Mask, place: tuple[float, float]) -> int:
-    """Pointing fingers on the largest piece of a mask (h, w); `place` of its middle about the face, face widths."""
-    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    if not outlines:
-        return 0
-    outline = max(outlines, key=cv2.contourArea)[:, 0, :].astype(np.float32)
-    filled = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), np.uint8)
-    cv2.fillPoly(filled, [outline.astype(np.int32) + 1], (1,))
-    radius = float(cv2.distanceTransform(filled, cv2.DIST_L2, 3).max())
-    if radius < 1:
-        return 0
-    scaled = (outline - outline.mean(axis=0)) * (PALM_RADIUS / radius) + np.array(place, np.float32)
-    hand = hand_of(np.asarray(scaled, np.float32))
+def fingers_of(hand: HandShape | None) -> int:
+    """How many fingers stand out as one that points does."""
     return 0 if hand is None else sum(finger.length >= POINTING_FINGER for finger in find_fingers(hand))
+
+
+def lone_hand(mask: Mask) -> HandShape | None:
+    """The hand at the end of the arm that comes into a mask (h, w), cut from a bare forearm as the tracker cuts it; none where
+    there is none. Nothing tells its size but the hand itself: palms are taken to be PALM_RADIUS wide, first of hand and
+    forearm, then of what was cut.
+    """
+    piece = _largest_piece(mask)
+    radius = _radius(piece)
+    if radius < 1:
+        return None
+    entered = _entered_at(piece)
+    config = TrackerConfig()
+    cut = cut_hand(piece, 0, 0, entered, radius / PALM_RADIUS * FACE_WIDTH_M / HEAD_WIDTH_M, config.hand_length, None)
+    way = np.array(cut.centroid) - entered
+    place = np.array(CHEST) + REACH * way / max(1e-6, float(np.hypot(*way)))
+    return hand_on(cut.mask, (float(place[0]), float(place[1])))
+
+
+def hand_on(mask: Mask, place: tuple[float, float]) -> HandShape | None:
+    """The largest piece of a mask (h, w) as a hand; `place` of its middle about the face, face widths. None without one."""
+    piece = _largest_piece(mask)
+    radius = _radius(piece)
+    if radius < 1:
+        return None
+    outline = outline_of(piece).astype(np.float32)
+    scaled = (outline - outline.mean(axis=0)) * (PALM_RADIUS / radius) + np.array(place, np.float32)
+    return hand_of(np.asarray(scaled, np.float32))
+
+
+def outline_of(piece: Mask) -> NDArray[np.int32]:
+    """Of one piece, (n, 2), x and y."""
+    outlines, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(max(outlines, key=cv2.contourArea)[:, 0, :], np.int32)
+
+
+def _largest_piece(mask: Mask) -> Mask:
+    """Without holes."""
+    piece = np.zeros(mask.shape, np.uint8)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if outlines:
+        cv2.drawContours(piece, [max(outlines, key=cv2.contourArea)], -1, (1,), cv2.FILLED)
+    return piece
+
+
+def _radius(piece: Mask) -> float:
+    """Of the largest circle in it, pixels."""
+    return float(cv2.distanceTransform(np.pad(piece, 1), cv2.DIST_L2, 3).max())
+
+
+def _entered_at(piece: Mask) -> tuple[float, float]:
+    """Where the arm comes into the picture; from below where it touches no border."""
+    rows, columns = np.nonzero(piece)
+    height, width = piece.shape
+    at = (rows < BORDER_PX) | (rows >= height - BORDER_PX) | (columns < BORDER_PX) | (columns >= width - BORDER_PX)
+    return (float(columns[at].mean()), float(rows[at].mean())) if at.any() else (float(columns.mean()), float(height))
 
 
 def _place(person: TruePerson, mask: Mask) -> tuple[float, float]:

@@ -6,8 +6,9 @@ A rule that helps on rendered people and hurts on real ones is out. Of --data (.
 * asl_clips, people who sign: faces found and yaws answered, by frames; pointing episodes a minute, each of them false;
 * drivface, drivers: the same, and the error against the yaw label (in steps of 15 degrees), each still shown for 3 frames;
 * hgr1, hands with skin masks: skin found, background taken for skin (by the prior alone), and of hands that extend the index
-  finger alone, how many show one finger; of those of all other signs, how many do all the same;
-* hands, hands with boxes: fingers alone, on what differs from the colours around the box.
+  finger alone, how many show one finger; of those of all other signs, how many do all the same; the same by the posture that
+  the stage calls, and in how many hands it is unknown;
+* hands, hands with boxes: fingers and posture alone, on what differs from the colours around the box.
 Beside them rendered clips: those of --simulated (by default DATA/rendered), or clips that the simulator makes of --seeds.
 Fingers and skin need their label pictures. What is not there is left out, and that is said. --sample bounds the work: so many
 rendered clips, and twenty times as many pictures of each set of hands, spread evenly.

@@ -54,7 +54,7 @@ def _margin_px(face: Face) -> int:
 
 
 def _cut_out(known: KnownHand, face: Face, rng: np.random.Generator) -> Pixels:
-    mask = _coarse(np.pad(known.hand.astype(np.uint8), _margin_px(face)), face.width_px, rng)
+    mask = coarse(np.pad(known.hand.astype(np.uint8), _margin_px(face)), face.width_px, rng)
     rows, columns = np.nonzero(mask)
     if not len(rows):
         return mask
@@ -67,7 +67,7 @@ def _cut_out(known: KnownHand, face: Face, rng: np.random.Generator) -> Pixels:
     return mask
 
 
-def _coarse(mask: Pixels, face_px: float, rng: np.random.Generator) -> Pixels:
+def coarse(mask: Pixels, face_px: float, rng: np.random.Generator) -> Pixels:
     """Edges a pixel off, thin fingers lost, gaps between fingers closed (trackers mostly do that); or as it is."""
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     square = np.ones((3, 3), np.uint8)

@@ -82,6 +82,9 @@ def titled(poi_id: str, names: Names) -> str:
     return f"{name} ({poi_id})" if name and name != poi_id else poi_id
 
 
+_POSTURES = {"index": "index finger", "open": "open palm", "fist": "fist", "thumb": "thumb"}
+
+
 def _head(pose: HeadPose) -> str:
     if pose.status == "tracking" and pose.yaw_deg is not None and pose.yaw_sigma_deg is not None:
         return f"{pose.yaw_deg:+.0f}±{pose.yaw_sigma_deg:.0f}°"
@@ -95,7 +98,7 @@ def _gesture(gesture: Gesture) -> str:
     what = gesture.phase if gesture.gesture == "none" else f"{gesture.phase} {gesture.gesture}"
     if gesture.bearing_deg is not None and gesture.bearing_sigma_deg is not None:
         what += f" {gesture.bearing_deg:+.0f}±{gesture.bearing_sigma_deg:.0f}°"
-    return what
+    return f"{what}, {_POSTURES[gesture.hand_posture]}" if gesture.hand_posture in _POSTURES else what
 
 
 def _person(person: PersonBelief, names: Names) -> str:

@@ -95,8 +95,8 @@ def _topics() -> Iterator[str]:
 
 
 def _deliveries() -> Iterator[str]:
-    yield "\nWhat a delivery is in Zenoh (of `reply`: what gets ask with). Congestion control is `DROP` (`BLOCK` where `camera/info`"
-    yield "says `lockstep`), reliability is left as it is; who keeps something answers a get on its key with the last one:\n"
+    yield "\nWhat a delivery is in Zenoh (of `reply`: what gets ask with). Congestion control is `DROP` (`BLOCK` where"
+    yield "`camera/info` says `lockstep`), reliability is left as it is; who keeps something answers a get with the last one:\n"
     yield "| delivery | priority | express |"
     yield "|---|---|---|"
     for stance, sent in SENT.items():

@@ -57,6 +57,7 @@ PoseStatus = Literal["tracking", "out_of_range", "initialising", "lost"]
 Phase = Literal["idle", "preparation", "stroke", "retraction"]
 GestureKind = Literal["point_left", "point_right", "invisible", "other", "none"]
 Side = Literal["left", "right"]
+HandPosture = Literal["index", "open", "fist", "thumb", "other", "unknown"]
 FrameEncoding = Literal["bgr8", "mono8", "jpeg"]
 CameraState = Literal["starting", "streaming", "retrying", "ended", "failed"]
 SourceStatus = Literal["ok", "late", "dead", "wrong_version", "not_tracking"]
@@ -338,6 +339,14 @@ class Gesture(Part):
     point_log_odds: dict[Annotated[str, Field(max_length=32)], LogOdds] = Field(
         default_factory=dict, max_length=16, description="What spoke for a pointing (above 0) and against it (below), by name."
     )
+    hand_posture: HandPosture | None = Field(
+        default=None,
+        description="Of a held hand: the index finger alone stretched, the open palm, a fist, the thumb alone, something else; "
+        "`unknown` where the picture does not tell. None outside of strokes, and of a stage that does not look.",
+    )
+    hand_posture_probability: Share | None = Field(
+        default=None, description="Of the likeliest posture, also where unknown is said."
+    )
 
     @model_validator(mode="after")
     def _bearing_has_sigma(self) -> Self:
@@ -351,6 +360,12 @@ class Gesture(Part):
     def _elevation_has_sigma(self) -> Self:
         if (self.elevation_deg is None) != (self.elevation_sigma_deg is None):
             raise ValueError("elevation_sigma_deg: elevation_deg and elevation_sigma_deg come together")
+        return self
+
+    @model_validator(mode="after")
+    def _posture_has_probability(self) -> Self:
+        if (self.hand_posture is None) != (self.hand_posture_probability is None):
+            raise ValueError("hand_posture_probability: hand_posture and hand_posture_probability come together")
         return self
 
 

@@ -158,6 +158,8 @@ SAMPLES: tuple[m.Message, ...] = (
                 elevation_sigma_deg=14.0,
                 point_probability=0.93,
                 point_log_odds={"posture": 2.1, "way": 0.5},
+                hand_posture="index",
+                hand_posture_probability=0.88,
             )
         ],
     ),

@@ -106,7 +106,7 @@ def test_a_line_tells_what_each_stage_sees():
         "face",
         "+58±4°",
         "out of range right",
-        "stroke point_left +62±15°",
+        "stroke point_left +62±15°, index finger",
         "the blue vase (vase) 0.97",
         "without headpose",
     ):

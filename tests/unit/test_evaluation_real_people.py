@@ -30,12 +30,12 @@ def hand(fingers: int) -> np.ndarray:
 
 @pytest.mark.parametrize("fingers", [0, 1, 2])
 def test_fingers_of_a_drawn_hand_are_counted_at_any_size(fingers: int) -> None:
-    from real_hands import RAISED, fingers_of
+    from real_hands import fingers_of, lone_hand
 
     mask = hand(fingers)
-    assert fingers_of(mask, RAISED) == fingers
-    assert fingers_of(cv2.resize(mask, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_NEAREST), RAISED) == fingers
-    assert fingers_of(np.zeros_like(mask), RAISED) == 0
+    assert fingers_of(lone_hand(mask)) == fingers
+    assert fingers_of(lone_hand(cv2.resize(mask, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_NEAREST))) == fingers
+    assert fingers_of(lone_hand(np.zeros_like(mask))) == 0
 
 
 def test_items_are_sampled_evenly() -> None:
@@ -55,7 +55,7 @@ def test_a_little_finger_alone_counts_as_another_hand_that_was_taken_for_an_inde
 
 
 def test_a_boxed_hand_is_cut_out_whatever_the_colour_of_the_wall() -> None:
-    from real_hands import RAISED, cut_out, fingers_of
+    from real_hands import RAISED, cut_out, fingers_of, hand_on
 
     mask = hand(1)
     for wall in ((90, 90, 90), (90, 140, 200)):  # the second is of the colour of skin to the prior
@@ -64,7 +64,7 @@ def test_a_boxed_hand_is_cut_out_whatever_the_colour_of_the_wall() -> None:
         picture = np.clip(picture + np.random.default_rng(1).normal(0, 4, picture.shape), 0, 255).astype(np.uint8)
         rows, columns = np.nonzero(mask)
         box = int(columns.min()) - 4, int(rows.min()) - 4, int(columns.max()) + 4, int(rows.max()) + 4
-        assert fingers_of(cut_out(picture, box), RAISED) == 1
+        assert fingers_of(hand_on(cut_out(picture, box), RAISED)) == 1
     assert not cut_out(np.zeros((20, 20, 3), np.uint8), (0, 0, 20, 20)).any()
 
 

@@ -117,6 +117,17 @@ def test_an_open_hand_is_other():
     assert all(g.bearing_deg is None for g in _settled(answers))
 
 
+def test_a_held_hands_posture_is_told_and_a_moving_hands_is_not():
+    told = {gesture.phase: set() for _, (gesture,) in _played(_pointing)}
+    for _, (gesture,) in _played(_pointing):
+        told[gesture.phase].add(gesture.hand_posture)
+    assert told.pop("stroke") - {None} == {"index"}
+    assert set.union(*told.values()) == {None}
+    opened = _settled(_played(lambda t: [_face(), _hand(_place(t, held=(-1.8, 0.2)), OPEN)]))
+    assert "index" not in {gesture.hand_posture for gesture in opened}
+    assert all(gesture.hand_posture_probability > 0.2 for gesture in opened)
+
+
 def test_a_fist_held_toward_the_camera_is_invisible():
     assert {g.gesture for g in _settled(_played(lambda t: [_face(), _hand(_place(t, held=(-1.9, 0.9)), ())]))} == {"invisible"}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
+from typing import NamedTuple
 
 from deixis_schemas.messages import GestureKind, Phase, Side, Track
 
@@ -13,6 +14,7 @@ from .config import GestureConfig
 from .deixis_stroke import DeixisStroke
 from .fingertips import Finger, find_fingers
 from .hand import CHEST, Face, HandShape, hand_of, unpack_contour
+from .hand_posture import PostureOdds, mean_of, posture_of
 from .held_hand import held_hand
 from .paper_stroke import PaperStroke
 from .phases import PhaseTracker
@@ -28,6 +30,14 @@ MEASURED_S = 0.48
 LOW = 3.6
 
 
+class _Measured(NamedTuple):
+    """What one frame of a stroke shows."""
+
+    time_s: float
+    sight: HandSight
+    posture: PostureOdds
+
+
 class Arm:
     """Phase, gesture and shape of one hand. `resting_until_s`: a hand found raised before then may rest there."""
 
@@ -39,7 +49,7 @@ class Arm:
         self._resting_until_s = resting_until_s
         self._first_s: float | None = None
         self._leftness = 0.0
-        self._measures: deque[tuple[float, HandSight]] = deque()
+        self._measures: deque[_Measured] = deque()
         self._place_px = (0.0, 0.0)
         self._gone: Point = (0.0, 0.0)
         self._last: tuple[Point, Point] | None = None  # in the picture, pixels; and how far the room had moved
@@ -75,12 +85,17 @@ class Arm:
         """What the stroke so far shows of the hand: medians of its last `MEASURED_S`; None without any."""
         if not self._measures:
             return None
-        sights = [sight for _, sight in self._measures]
+        sights = [measured.sight for measured in self._measures]
         return HandSight(
             _middle([sight.tip for sight in sights]),
             _middle([sight.fist for sight in sights]),
             statistics.median(sight.radius for sight in sights),
         )
+
+    @property
+    def posture(self) -> PostureOdds | None:
+        """The hand's posture in the same part of the stroke; None without any."""
+        return mean_of([measured.posture for measured in self._measures]) if self._measures else None
 
     def distance_px(self, track: Track) -> float:
         """How far a track is from where this hand was seen last, pixels."""
@@ -153,8 +168,8 @@ class Arm:
         return math.dist(place, fellow) <= self._config.hands_together
 
     def _measure(self, hand: HandShape, time_s: float) -> None:
-        self._measures.append((time_s, HandSight(hand.tip, hand.palm, hand.palm_radius)))
-        while time_s - self._measures[0][0] > MEASURED_S:
+        self._measures.append(_Measured(time_s, HandSight(hand.tip, hand.palm, hand.palm_radius), posture_of(hand)))
+        while time_s - self._measures[0].time_s > MEASURED_S:
             self._measures.popleft()
 
     def _was_raised_before_us(self) -> bool:

@@ -158,6 +158,7 @@ class Person:
             return Gesture(person_id=self._person_id, phase="idle", gesture="none")
         gesture = arm.gesture if arm.phase == "stroke" else "none"
         bearing = _bearing(arm, face, view) if gesture in POINTING else None
+        posture = arm.posture
         return Gesture(
             person_id=self._person_id,
             phase=arm.phase,
@@ -172,6 +173,8 @@ class Person:
             elevation_sigma_deg=bearing.elevation_sigma_deg if bearing else None,
             point_probability=arm.verdict.probability,
             point_log_odds=dict(arm.verdict.log_odds),
+            hand_posture=posture.named if posture else None,
+            hand_posture_probability=max(posture.shares) if posture else None,
         )
 
 

@@ -10,6 +10,7 @@ from deixis_schemas.runs import RunClock
 
 from .bearing import ARM_SIDES, load_arms
 from .config import GestureConfig
+from .hand_posture import load_network
 from .person import Person, View
 from .pointing_odds import frame_odds, stroke_odds
 
@@ -22,7 +23,7 @@ class GestureRecognizer:
     def __init__(self, config: GestureConfig) -> None:
         for side in ARM_SIDES:
             load_arms(side)  # now, not within the first pointing
-        frame_odds(), stroke_odds()
+        frame_odds(), stroke_odds(), load_network()
         self._config = config
         self._persons: dict[int, Person] = {}
         self._clock = RunClock()
