@@ -70,8 +70,8 @@ rerun: .venv/.rerun
 	@$(PIP) --no-build-isolation -e 'view[rerun]'
 	@touch $@
 
-# Half of the tests' time is waiting, so that two processors have time for more than two files at once.
-WORKERS ?= 3
+# Some files start ten processes. With three at once two slow processors had a load of 27, and what has to begin in time did not.
+WORKERS ?= 2
 test: setup check
 	@# A file's tests stay together, for they share the system that they run. tests/conftest.py says in which order.
 	@$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder

@@ -33,7 +33,7 @@ from running import ROOT
 from site_made import add, make_site
 
 ENDS_S, READY_S, STOPS_S = 120.0, 60.0, 30.0
-AT_ONCE = 4
+AT_ONCE = 3
 """Machines that run beside each other: most of the time is waiting."""
 COPIED = ("README.md", "Makefile", "mkdocs.yml", "docs", "examples", "schemas")
 ALL = commands()
