@@ -16,15 +16,16 @@ ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"
 
 
-# Workers take file by file: one that takes minutes must not be the last. These begin, by how long they took; the first one
-# builds a crate where it was not built before.
+# Workers take file by file: one that takes minutes must not be the last. These begin, by how long they took; the second one
+# builds a crate where it was not built before. Not beside each other are the pages and the containers: they start ten and more
+# processes each, and on two slow processors containers were called unhealthy while they began.
 LONGEST_FIRST = (
-    "test_gesture_rust.py",
-    "test_compose.py",
     "test_pages.py",
+    "test_gesture_rust.py",
     "test_zenoh_cli.py",
     "test_simulation_command.py",
     "test_supervision_faults.py",
+    "test_compose.py",
     "test_supervision_stages.py",
     "test_cli_system.py",
     "test_check_stage.py",
