@@ -235,7 +235,7 @@ STATUSES = (
     (
         r".*deixis calibrate site .*--from.*",
         3,
-        r"the mount cannot be judged|confused",
+        r"the mount cannot be judged|P3 +told apart",
         "the clip that stands for a person points at P3, whatever is asked; a slow machine hears several of its pointings",
     ),
     (r"make demo", 2, r"this machine is too slow or too busy", "it plays in real time"),

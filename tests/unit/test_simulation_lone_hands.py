@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from deixis_simulation.avatars import HELD_OUT_AVATARS
 from deixis_simulation.hand_shapes import FIST
-from deixis_simulation.lone_hands import SHAPES, drawn_shape, lone_hands
+from deixis_simulation.lone_hands import PX_PER_FACE, SHAPES, drawn_shape, lone_hands
 
 
 def test_the_same_seed_draws_the_same_hands() -> None:
@@ -20,7 +20,7 @@ def test_a_hand_is_one_piece_without_holes_about_as_large_as_hands_are() -> None
         pieces, _, sizes, _ = cv2.connectedComponentsWithStats(hand.mask, connectivity=8)
         assert pieces >= 2
         assert sizes[1:, cv2.CC_STAT_AREA].max() > 0.98 * hand.mask.sum()
-        assert 0.1 < hand.mask.sum() / 60**2 < 1.8  # square face widths, with some of the forearm
+        assert 0.1 < hand.mask.sum() / PX_PER_FACE**2 < 1.8  # square face widths, with some of the forearm
         assert np.hypot(*hand.along) == pytest.approx(1)
 
 
