@@ -51,6 +51,30 @@ def test_a_published_face_is_as_wide_as_the_contract_says_and_centred_on_the_hea
     assert x + width / 2 == pytest.approx(2 * (300 + 0.5) - 0.5)
 
 
+def test_a_clear_face_is_followed_from_the_first_picture_on(frames):
+    assert [track.kind for track in Tracker(TrackerConfig()).update(frames[0], 1, 0)] == ["face"]
+
+
+def in_profile(hair_bgr):
+    """A head at (100, 80) in coarse pixels, all of it the colour of skin, face to the left."""
+    coarse = np.full((240, 320, 3), 200, np.uint8)
+    skin = np.zeros(coarse.shape[:2], np.uint8)
+    skin[55:105, 80:120] = 255
+    coarse[55:105, 80:120] = hair_bgr
+    coarse[60:105, 80:92] = (120, 140, 190)
+    return Views(coarse, 2.0, coarse, coarse, skin, skin)
+
+
+@pytest.mark.parametrize(
+    ("brightness", "hair_bgr", "x"), [(150, (30, 45, 60), 86), (None, (30, 45, 60), 100), (150, (90, 120, 160), 100)]
+)
+def test_a_turned_face_is_where_the_skin_is_not_as_dark_as_hair(brightness, hair_bgr, x):
+    heads = HeadTracks((480, 640), 1.0, TrackerConfig(), Finder(), count(), count())
+    centre = heads._centre_of_skin(person_at(200, 160, 80.0), in_profile(hair_bgr), brightness)
+    assert centre is not None
+    assert centre[0] / 2 == pytest.approx(x, abs=1.5)
+
+
 def test_a_new_face_is_measured_in_each_frame_and_later_every_0_8_s(frames):
     tracker = Tracker(TrackerConfig())
     seen = [k for k, image in enumerate(frames) if any(t.frontal for t in tracker.update(image, 1, k * PERIOD_NS))]

@@ -18,7 +18,8 @@ from deixis_tracker.faces import look
 from deixis_tracker.finder import Finder, Look, apart, close_looks, whole_looks
 from deixis_tracker.frame import COARSE, Step, Views, around
 from deixis_tracker.persons import Person
-from deixis_tracker.sway import Glimpse
+from deixis_tracker.skin import skin_share
+from deixis_tracker.sway import CLEAR, SLIGHT, Glimpse
 
 SEARCH_S = 0.5  # as many looks as show the whole picture at all scales, once somebody is tracked
 SCALE_S = 1 / 30  # one look, before
@@ -31,6 +32,14 @@ MOST_LOOKS, MOST_CANDIDATES, LOOKS_A_FRAME = 30, 12, 2
 MOVED = 0.08  # share of a place that moved, of a head
 ABOUT = 6.5  # head widths around somebody known: arms reach so far, and what they pass before seems to move
 DISTURBED_S = 0.8  # motion says nothing so long after somebody known was there, or the light was switched
+# Near somebody known a sway counts of what looks like a head as most heads do: three quarters of them, and 1 of 18 other places
+# that the finder took for heads (`fitting/choose_sway.py`).
+SURE_ODDS, SURE_LOOKS = 1.7, 4
+FACE_WORTH = (
+    1.1  # of a frontal face where the finder surely sees a head: both need one picture. Less sure, it was a printed skull
+)
+FRESH_LOOKS = 4  # so many are taken in frames that follow each other, also once somebody is tracked
+LEAST_SKIN = 0.12  # mean P(skin) in the middle of a head that shows some of its face
 NEAR = 0.5  # head widths: so near it is the same head
 WALKING = 9.0  # head widths a second
 
@@ -45,9 +54,21 @@ class Candidate:
     odds: float
     seen_ns: int
     looks: int = 1
+    sum_of_odds: float = 0.0  # of all looks after the first
     alive: bool = False  # it moved or swayed, or a face was seen from the front
     disturbed_ns: int = -(10**18)  # when its motion said nothing last
+    lit_ns: int = -(10**18)  # when the light changed last
+    shows_skin: bool = False  # in some look
     glimpse: Glimpse | None = None  # how the place was seen first
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the finder sees it as clearly as it sees most heads."""
+        return self.looks > SURE_LOOKS and self.sum_of_odds >= SURE_ODDS * (self.looks - 1)
+
+    def shows_face(self, views: Views) -> bool:
+        """Whether its face is seen from the front."""
+        return look(views.full, self.x, self.y, self.width) is not None
 
     def is_near(self, x: float, y: float, widths: float) -> bool:
         """Whether a place is so many head widths away at most."""
@@ -85,14 +106,18 @@ class HeadSearch:
 
     def confirmed(self, views: Views, motion: MotionHistory, tracked: int, step: Step) -> list[Candidate]:
         """Look at the candidates again, but those found in this picture; those believed are returned and leave the list."""
-        if tracked and not step.periods(LOOK_AGAIN_S):
-            return []
+        found_now = (candidate for candidate in self.candidates if candidate.seen_ns == step.now_ns)
+        for candidate in [candidate for candidate in found_now if candidate.odds >= SURE_ODDS - DOUBTFUL][:LOOKS_A_FRAME]:
+            candidate.alive = candidate.shows_face(views)
+            candidate.odds += FACE_WORTH * candidate.alive
         earlier = [candidate for candidate in self.candidates if candidate.seen_ns < step.now_ns]
+        if tracked and not step.periods(LOOK_AGAIN_S):
+            earlier = [candidate for candidate in earlier if candidate.looks < FRESH_LOOKS]
         for candidate in sorted(earlier, key=lambda c: c.looks)[:LOOKS_A_FRAME]:
             self._look(candidate, views, step)
             if not candidate.alive:
                 candidate.alive = (
-                    self._moves(candidate, motion, step) or _is_face(candidate, views) or _sways(candidate, views, step)
+                    self._moves(candidate, motion, step) or candidate.shows_face(views) or _sways(candidate, views, step)
                 )
         believed = [c for c in self.candidates if c.alive and c.odds >= self._config.confirm_odds]
         kept = [c for c in self.candidates if c not in believed and c.odds > -MOST_FOR and c.looks < MOST_LOOKS]
@@ -108,6 +133,8 @@ class HeadSearch:
     def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
         """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""
         for candidate in self.candidates:
+            if unstable:
+                candidate.lit_ns = step.now_ns
             if unstable or any(person.distance(candidate.x, candidate.y) < ABOUT for person in persons):
                 candidate.disturbed_ns = step.now_ns
 
@@ -135,24 +162,26 @@ class HeadSearch:
             candidate.odds -= share * MOST_AGAINST
             return
         best = heads[0]
+        candidate.sum_of_odds += best.odds
         candidate.odds += share * worth(best.odds)
         candidate.x, candidate.y = best.x, best.y
         candidate.width += 0.5 * (best.width - candidate.width)
-
-
-def _is_face(candidate: Candidate, views: Views) -> bool:
-    return look(views.full, candidate.x, candidate.y, candidate.width) is not None
+        candidate.shows_skin |= skin_share(views.skin, candidate.x, candidate.y, candidate.width) >= LEAST_SKIN
 
 
 def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
-    """Whether it sways as people do who stand still; where known people are about, what passes before it seems to."""
-    if step.now_ns - candidate.disturbed_ns < DISTURBED_S * 1e9:
+    """Whether it sways as people do who stand still.
+
+    Near known people, who may pass before it, it must surely be a head, too; and what shows no skin must sway clearly.
+    """
+    is_person = candidate.is_sure and candidate.shows_skin
+    if step.now_ns - (candidate.lit_ns if is_person else candidate.disturbed_ns) < DISTURBED_S * 1e9:
         candidate.glimpse = None
         return False
     if candidate.glimpse is None:
         candidate.glimpse = Glimpse.of(views.full, candidate.x, candidate.y, candidate.width, step.now_ns)
         return False
-    return candidate.glimpse.sways(views.full, step.now_ns)
+    return candidate.glimpse.sways(views.full, step.now_ns, SLIGHT if candidate.shows_skin else CLEAR)
 
 
 def worth(odds: float) -> float:

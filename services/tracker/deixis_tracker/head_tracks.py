@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from deixis_tracker.background import Background, MotionHistory
 from deixis_tracker.camera_motion import Shift
@@ -23,7 +25,7 @@ from deixis_tracker.head_search import HeadSearch
 from deixis_tracker.heads import LEAST_SUPPORT, HeadColours, HeadFinder
 from deixis_tracker.kalman import PointFilter
 from deixis_tracker.persons import Person
-from deixis_tracker.skin import SkinModel
+from deixis_tracker.skin import SkinModel, skin_share
 
 HEAD_ACCELERATION = 25.0  # head widths per second squared
 UNSEEN_SPEED_KEPT = 0.8**30  # of a head that is not seen, per second: it is not flown out of the picture
@@ -44,6 +46,8 @@ NEAR, SAME = 0.8, 0.5  # head widths: the finder's head is so near the predictio
 SHAPE_SIGMA, COLOURS_AGREE = 0.08, 0.35  # head widths
 WIDTH_RATE, WIDTH_OFF = 0.1, 0.25  # how fast the finder's width is taken, and by how much it is off where a face told it
 LEARN_SKIN_S, LEAST_SKIN = 0.5, 0.12
+LEAST_FACE = 0.08  # of a face that is seen, head widths squared
+LEVEL, DARKEST_FACE = np.full((1, 3), 1 / 3, np.float32), 0.55  # of a face's own brightness: hair is darker
 
 
 class HeadTracks:
@@ -76,7 +80,7 @@ class HeadTracks:
         self._drop_lost(skin, step)
         self._drop_doubles(skin)
         for person in self.persons:
-            person.skin_centre = self._centre_of_skin(person, views.skin)
+            person.skin_centre = self._centre_of_skin(person, views, skin.brightness(person.person_id))
         self._find_heads(views, room, motion, skin, step)
         self._measure_faces(views, step)
 
@@ -120,7 +124,7 @@ class HeadTracks:
 
         # Whoever never showed the face has skin, too; of others it is learned better from the front.
         faceless = seen is not None and not covered and not person.sightings
-        if step.periods(LEARN_SKIN_S) and faceless and _skin_share(person, views.skin) >= LEAST_SKIN:
+        if step.periods(LEARN_SKIN_S) and faceless and skin_share(views.skin, person.x, person.y, person.width) >= LEAST_SKIN:
             _learn_skin(person, views.full, skin)
 
     def _seen_as_shape(self, person: Person) -> Seen | None:
@@ -159,14 +163,27 @@ class HeadTracks:
         if person.sightings % SKIN_FROM_EVERY == 1:
             _learn_skin(person, views.full, skin)
 
-    def _centre_of_skin(self, person: Person, skin: Image) -> tuple[float, float] | None:
-        """Centroid of the skin on the head: where the face is on a head that is turned."""
-        rows, columns = person.head_box().scaled(COARSE).window(*skin.shape)
-        moments = cv2.moments(cv2.inRange(skin[rows, columns], self._config.skin_high, 255), binaryImage=True)
-        if moments["m00"] < 0.08 * (COARSE * person.width) ** 2:
+    def _centre_of_skin(self, person: Person, views: Views, brightness: float | None) -> tuple[float, float] | None:
+        """Centroid of the skin on the head: where the face is on a head that is turned.
+
+        Of the same colour as skin, brown hair is darker: in profile it is most of the head. `brightness`: of the face, if seen.
+        """
+        rows, columns = person.head_box().scaled(COARSE).window(*views.skin.shape)
+        skin = cv2.inRange(views.skin[rows, columns], self._config.skin_high, 255)
+        if brightness is not None and skin.size:
+            level = cv2.transform(views.coarse[rows, columns], LEVEL)
+            likely = cv2.inRange(views.skin[rows, columns], (self._config.skin_low + self._config.skin_high) // 2, 255)
+            bright = cv2.bitwise_and(likely, cv2.inRange(level, DARKEST_FACE * brightness, 255))
+            skin = bright if self._is_face(bright, person) else skin
+        if not self._is_face(skin, person):
             return None
+        moments = cv2.moments(skin, binaryImage=True)
         x, y = columns.start + moments["m10"] / moments["m00"], rows.start + moments["m01"] / moments["m00"]
         return x / COARSE, y / COARSE
+
+    @staticmethod
+    def _is_face(mask: NDArray[Any], person: Person) -> bool:
+        return cv2.countNonZero(mask) >= LEAST_FACE * (COARSE * person.width) ** 2 > 0
 
     def _hand_before(self, person: Person) -> bool:
         w = person.width
@@ -255,13 +272,6 @@ def _measuring_is_due(person: Person, step: Step) -> bool:
 def _look(person: Person, views: Views) -> Box | None:
     """The Haar box of a person's face, where it is seen from the front."""
     return look(views.full, person.x, person.y + BOX_BELOW_HEAD * person.width, person.width)
-
-
-def _skin_share(person: Person, skin: Image) -> float:
-    """Mean P(skin), of a coarse map, in the middle of a head, 0 to 1."""
-    half = 0.25 * person.width
-    rows, columns = around(person.x, person.y, half, half, half, half).scaled(COARSE).window(*skin.shape)
-    return float(skin[rows, columns].mean()) / 255 if skin[rows, columns].size else 0.0
 
 
 def _learn_skin(person: Person, work: Image, skin: SkinModel) -> None:

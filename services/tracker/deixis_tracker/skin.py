@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from deixis_tracker.frame import Image, Mask
+from deixis_tracker.frame import COARSE, Image, Mask, around
 from deixis_tracker.skin_prior import OTHER, SKIN, Gaussian
 
 Array = NDArray[np.float64]
@@ -141,6 +141,11 @@ class SkinModel:
         self._person_density[person_id] = gaussian_densities(self._features, mean, covariance + SPREAD_FLOOR)
         self._table = None
 
+    def brightness(self, person_id: int) -> float | None:
+        """Grey level of a person's face as it was seen from the front; none before it was."""
+        known = self._person.get(person_id)
+        return None if known is None else float(np.exp(known[0][2])) - OFFSET
+
     def adapt_room(self, image: Image, room: Mask) -> None:
         """Learn the colours of the room, where `room` (H, W) is not 0: what is no skin here."""
         density = self._density_of(image, room)
@@ -192,6 +197,13 @@ class SkinModel:
         """Volume of each table cell in feature space; the Jacobian of the three logs is 1 / (R G B)."""
         b, g, r = (_table_colours().T + OFFSET)[:3]
         return np.asarray((256 / BINS) ** 3 / (r * g * b), np.float64)
+
+
+def skin_share(skin: Image, x: float, y: float, width: float) -> float:
+    """Mean P(skin), 0 to 1, of a coarse map (H, W) in the middle of a head; place and width: pixels of the working picture."""
+    half = 0.25 * width
+    rows, columns = around(x, y, half, half, half, half).scaled(COARSE).window(*skin.shape)
+    return float(skin[rows, columns].mean()) / 255 if skin[rows, columns].size else 0.0
 
 
 def smoothed(counts: Array, beside: float) -> Array:
