@@ -103,3 +103,22 @@ def test_velocity_of_a_steady_motion_is_exact(vx, vy, rate_hz):
     for i in range(12):
         motion.add(i / rate_hz, (vx * i / rate_hz, vy * i / rate_hz))
     assert motion.velocity == pytest.approx((vx, vy), abs=1e-6)
+
+
+@pytest.mark.parametrize("rate_hz", [10, 30, 60])
+def test_an_outline_that_jumps_to_and_fro_breaks_no_stroke(rate_hz):
+    def jumping(time_s):
+        x, y = _pointing_hand(time_s)
+        return (x + (0.4 if int(8 * time_s) % 2 else 0.0), y) if STROKE_S + 0.2 < time_s < RETRACTION_S else (x, y)
+
+    held = [phase for t, phase in _phases(_times(rate_hz), jumping) if STROKE_S + 0.2 <= t < RETRACTION_S]
+    assert set(held) == {"stroke"}
+
+
+def test_a_waving_hand_does_not_stay_where_it_is_held():
+    def waving(time_s):
+        x, y = _pointing_hand(time_s)
+        return (x + 0.9 * math.sin(2 * math.pi * 2 * time_s), y) if STROKE_S < time_s < RETRACTION_S else (x, y)
+
+    waves = [phase for t, phase in _phases(_times(30), waving) if STROKE_S + 0.3 <= t < RETRACTION_S]
+    assert waves.count("stroke") < 0.5 * len(waves)

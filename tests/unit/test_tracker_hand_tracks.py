@@ -76,6 +76,26 @@ def seen_at(x, y, odds):
     return Surroundings(maps, 0, 0, 1.0)
 
 
+def full_of_holes(height, width):
+    """The mask of an arm before a wall of the colour of skin."""
+    mask = np.ones((height, width), np.uint8)
+    mask[1::5] = 0
+    mask[:, 2::7] = 0
+    return mask
+
+
+@pytest.mark.parametrize(("odds", "found"), [(2.0, True), (0.7, False)])
+def test_a_hand_full_of_holes_is_mended_where_the_finder_surely_sees_it(person, odds, found):
+    person.hands = []
+    person.around, person.around_ns = seen_at(285, 250, odds), STEP.now_ns
+    arm = Blob(full_of_holes(120, 34), 268, 155, 0, 1.0, 0.9)
+    HandTracks((480, 640), TrackerConfig(), count(3)).update([person], [arm._replace(area=int(arm.mask.sum()))], STEP)
+    assert len(person.hands) == found
+    if found:
+        assert person.hands[0].last_seen == pytest.approx((285, 252), abs=8)
+        assert person.hands[0].blob.area > 0.3 * person.width**2
+
+
 def followed(person, odds):
     """Middle of a hand at (285, 250) beside a wall of the colour of skin, tracked while the finder has such odds."""
     person.hands, places = [hand_at(1, "right_hand", 270, 235)], []

@@ -2,9 +2,13 @@ import cv2
 import numpy as np
 import pytest
 from deixis_tracker.config import TrackerConfig
-from deixis_tracker.finder import Finder
+from deixis_tracker.finder import RIGHT_HAND, STRIDE, Finder, Surroundings
 from deixis_tracker.frame import Step, Views, coarsened
 from deixis_tracker.head_search import DISTURBED_S, Candidate, HeadSearch, _sways
+from deixis_tracker.heads import HeadColours
+from deixis_tracker.hypotheses import sample_pixels
+from deixis_tracker.kalman import PointFilter
+from deixis_tracker.persons import HandTrack, Person
 
 PERIOD_NS = 33_333_333
 FRAMES = 8
@@ -48,11 +52,36 @@ def test_beside_somebody_known_only_what_is_surely_a_head_is_noticed(mean_odds, 
     assert stands(near_somebody=True, mean_odds=mean_odds, shows_skin=shows_skin, sway_px=1.0) is noticed
 
 
+def with_hand(hands, odds):
+    person = Person(0, 0, PointFilter(160, 40, 1.0, 500.0), 40.0, HeadColours(), 0, 0, 0)
+    pixels = sample_pixels(np.ones((20, 20), np.uint8), 150, 110)
+    person.hands = [HandTrack(1, PointFilter(x, 120, 1.0, 500.0), pixels, None, 0, "left_hand") for x in hands]
+    maps = np.full((4, 60, 80), -9.0, np.float32)
+    maps[RIGHT_HAND, 120 // STRIDE, 160 // STRIDE] = odds
+    person.around = Surroundings(maps, 0, 0, 1.0)
+    return person
+
+
+@pytest.mark.parametrize(
+    ("hands", "odds", "is_hand"), [((170,), -9.0, True), ((), 2.0, True), ((250,), -9.0, False), ((), 0.2, False)]
+)
+def test_somebodys_hand_that_sways_is_no_head(hands, odds, is_hand):
+    search = HeadSearch(240, 320, 1.0, TrackerConfig(), Finder())
+    candidate = Candidate(160, 120, 30, 8.0, 0, looks=FRAMES, sum_of_odds=20.0, shows_skin=True)
+    search.candidates.append(candidate)
+    found = False
+    for k in range(FRAMES):
+        step = Step(10**10 + k * PERIOD_NS, k * PERIOD_NS, PERIOD_NS)
+        search.disturb([with_hand(hands, odds)], False, step)
+        found |= _sways(candidate, view(k / (FRAMES - 1)), step)
+    assert found is not is_hand
+
+
 def test_while_the_light_changes_nobody_is_noticed():
     candidate = Candidate(160, 120, 30, 8.0, 0, looks=FRAMES, sum_of_odds=20.0, shows_skin=True)
     for k in range(int(DISTURBED_S * 30)):
         step = Step(10**10 + k * PERIOD_NS, k * PERIOD_NS, PERIOD_NS)
-        candidate.lit_ns = 10**10
+        candidate.doubted_ns = 10**10
         assert not _sways(candidate, view(0.1 * k), step)
 
 

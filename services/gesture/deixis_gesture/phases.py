@@ -25,6 +25,11 @@ RESTING_SPEED = 0.7
 RAISING_AGAIN_SPEED = 2.0
 # A hand is under way when it is this far from where it rested, face widths; outlines at rest flicker by less.
 LEAVING_DISTANCE = 0.15
+# A hand that is held is still while it stays this near to where it is held, face widths: its outline is cut now here, now there
+# from the arm and jumps by 0.3, by which strokes broke off five times a second. Chosen among 0.35, 0.5 and 0.65 by
+# `deixis eval --stage gesture --seeds 1000:1040`.
+HELD_WITHIN = 0.5
+HELD_TIME_S = 0.2
 REST_TIME_S = 0.5
 KEEP_SAMPLES = 64
 
@@ -74,6 +79,7 @@ class PhaseTracker:
         self.rose = False
         self.raised = False
         self._rest: tuple[float, float] | None = None
+        self._held: tuple[float, float] | None = None
         self._last_s = 0.0
         self._departure: tuple[float, tuple[float, float]] | None = None
         self.way: Way | None = None
@@ -87,9 +93,11 @@ class PhaseTracker:
             outward = velocity[0] if place[0] > 0 else -velocity[0]
             leaving = max(-velocity[1], outward) if self._has_left_rest(point) else 0.0
             before = self.phase
-            self.phase = "idle" if walking and self.phase != "stroke" else self._following(*velocity, leaving)
+            at_hold = self._held is not None and math.dist(self._held, point) < HELD_WITHIN
+            self.phase = "idle" if walking and self.phase != "stroke" else self._following(*velocity, leaving, at_hold)
             self._follow_way(time_s, place, before)
             self.rose = self.phase == "preparation" or (self.rose and self.phase != "idle")
+        self._held = _nearer(self._held or point, point, time_s - self._last_s, HELD_TIME_S) if self.phase == "stroke" else None
         self._follow_rest(time_s, point)
         return self.phase
 
@@ -111,12 +119,11 @@ class PhaseTracker:
 
     def _follow_rest(self, time_s: float, point: tuple[float, float]) -> None:
         """Where the idle hand is, slowly: breathing and a shifting outline are not under way."""
-        share = 1 - math.exp(-max(0.0, time_s - self._last_s) / REST_TIME_S)
-        self._last_s = time_s
+        passed_s, self._last_s = time_s - self._last_s, time_s
         if self._rest is None or self.phase != "idle":
             self._rest = point
             return
-        self._rest = self._rest[0] + share * (point[0] - self._rest[0]), self._rest[1] + share * (point[1] - self._rest[1])
+        self._rest = _nearer(self._rest, point, passed_s, REST_TIME_S)
 
     def _is_raised(self, place: tuple[float, float]) -> bool:
         """Higher than a resting hand; once raised a hand may sink a little before it counts as lowered."""
@@ -131,9 +138,9 @@ class PhaseTracker:
             return False
         return self._departure[1][1] - place[1] >= self._config.raised_from_rest - slack
 
-    def _following(self, vx: float, vy: float, leaving: float) -> Phase:
+    def _following(self, vx: float, vy: float, leaving: float, at_hold: bool) -> Phase:
         speed = math.hypot(vx, vy)
-        still = speed < (self._config.moving_speed if self.phase == "stroke" else self._config.still_speed)
+        still = at_hold or speed < (self._config.moving_speed if self.phase == "stroke" else self._config.still_speed)
         if self.raised and still:
             return "stroke"
         if self.phase in ("stroke", "retraction"):
@@ -148,3 +155,11 @@ class PhaseTracker:
         if not self.raised and speed < RESTING_SPEED:
             return "idle"
         return "retraction" if vy > LEAVING_SPEED and not self.raised else "preparation"
+
+
+def _nearer(
+    place: tuple[float, float], point: tuple[float, float], passed_s: float, time_constant_s: float
+) -> tuple[float, float]:
+    """`place` moved toward `point`, by what is left of the way after so long."""
+    share = 1 - math.exp(-max(0.0, passed_s) / time_constant_s)
+    return place[0] + share * (point[0] - place[0]), place[1] + share * (point[1] - place[1])

@@ -46,4 +46,10 @@ class TrackerConfig(StageConfig):
     hand_length: float = Field(
         default=1.0, gt=0.2, le=3, description="Length of a hand, by which it is cut from a bare forearm."
     )
-    reach: float = Field(default=5.0, gt=1, le=20, description="Farthest a hand can be from its head.")
+    reach: float = Field(
+        default=6.0,
+        gt=1,
+        le=20,
+        description="Farthest a hand can be from its head: an arm is 4.5 long, and one stretched at the camera looks longer. "
+        "Chosen among 5, 6 and 6.5 by `deixis eval --stage gesture --seeds 1000:1040 --set tracker.reach=...`",
+    )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 
 from deixis_tracker.classifier import Features, label
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.finder import HAND, LEFT_HAND, RIGHT_HAND
 from deixis_tracker.found_hands import KEPT_ODDS, KEPT_SEEN_S, NO_HAND, REACH
-from deixis_tracker.frame import Step
+from deixis_tracker.frame import Mask, Step
 from deixis_tracker.hands import LEAST_THICKNESS, Hand, cut_hand, hand_about, thickness
 from deixis_tracker.hypotheses import Cells, Density, best_tracks, cells_of, propagate, sample_pixels, support
 from deixis_tracker.kalman import PointFilter
@@ -29,6 +30,7 @@ ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the bl
 # for so long. Chosen among 0.4, 0.8, 0.9, never, and with or without KEPT, by `deixis eval --stage tracker --seeds 1000:1012`.
 # Or if they are so much higher than at the end of the blob, which may be an elbow.
 SURELY, LIKELIER = 0.4, 1.0
+MOST_AREA, HOLES = 1.6, 0.2  # head widths squared, and head widths: of a hand, and holes in its mask that are filled
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
 UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, whatever its colour; blurred ones it misses a while
 EDGE_PX = 2  # a hand so near the picture's edge is cut by it
@@ -104,12 +106,34 @@ class HandTracks:
         hands = [cut_hand(blob.mask, blob.x0, blob.y0, shoulder, width, length, expected) for shoulder in shoulders]
         hand = max(hands, key=lambda h: min(math.dist(h.tip, shoulder) for shoulder in shoulders))
         hand, as_seen = self._as_seen(person, blob, hand, track, now_ns)
-        least, most = self._config.min_hand_area * person.width**2, 1.6 * person.width**2
-        if not least <= hand.area <= most or thickness(hand.mask) < LEAST_THICKNESS * person.width:
-            return None
+        if not self._is_whole(person, hand):
+            mended = self._mended(person, blob, hand, track, now_ns)
+            if mended is None:
+                return None
+            hand, as_seen = mended, True
         if as_seen and track is not None:
             track.as_seen_ns = now_ns
         return hand
+
+    def _is_whole(self, person: Person, hand: Hand) -> bool:
+        least, most = self._config.min_hand_area * person.width**2, MOST_AREA * person.width**2
+        return least <= hand.area <= most and thickness(hand.mask) >= LEAST_THICKNESS * person.width
+
+    def _mended(self, person: Person, blob: Blob, like: Hand, track: HandTrack | None, now_ns: int) -> Hand | None:
+        """The hand that the finder surely sees on a blob whose end is none: before a wall of the colour of skin a blob is full
+        of holes, too thin everywhere, and its end as often at the shoulder.
+        """
+        if person.around is None:
+            return None
+        width, places = person.width, person.around.hands(HAND, self._config.hand_odds + SURELY)
+        current = [(seen.x, seen.y) for seen in places if not person.is_outdated(seen.x, seen.y, now_ns)]
+        if track is not None:
+            current.sort(key=lambda at: math.dist(at, (track.motion.x, track.motion.y)))
+        for place in current:
+            hand = hand_about(_closed(blob.mask, HOLES * width), blob.x0, blob.y0, place, REACH * width, like)
+            if hand is not None and math.dist(hand.centroid, place) < ODDS_NEAR * width and self._is_whole(person, hand):
+                return hand
+        return None
 
     def _as_seen(self, person: Person, blob: Blob, hand: Hand, track: HandTrack | None, now_ns: int) -> tuple[Hand, bool]:
         """The hand where the finder surely sees it on this blob, if that is elsewhere than the blob's end, for walls pass for
@@ -206,6 +230,13 @@ class HandTracks:
         near = person.distance(x, y) < 1.3 * self._config.reach
         recent = step.now_ns - hand.seen_ns <= self._config.lose_hand_after_s * 1e9
         return near and recent and 0 <= x < width and 0 <= y < height
+
+
+def _closed(mask: Mask, holes_px: float) -> Mask:
+    """A mask (0 or 1) without holes and rifts that are narrower."""
+    size = max(3, round(holes_px) | 1)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
 
 
 def _hand_odds(person: Person, hand: Hand) -> float:

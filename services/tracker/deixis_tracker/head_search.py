@@ -15,7 +15,7 @@ from deixis_tracker.background import MotionHistory
 from deixis_tracker.camera_motion import Shift
 from deixis_tracker.config import TrackerConfig
 from deixis_tracker.faces import look
-from deixis_tracker.finder import Finder, Look, apart, close_looks, whole_looks
+from deixis_tracker.finder import HAND, Finder, Look, apart, close_looks, whole_looks
 from deixis_tracker.frame import COARSE, Step, Views, around
 from deixis_tracker.persons import Person
 from deixis_tracker.skin import skin_share
@@ -41,6 +41,7 @@ FACE_WORTH = (
 FRESH_LOOKS = 4  # so many are taken in frames that follow each other, also once somebody is tracked
 LEAST_SKIN = 0.12  # mean P(skin) in the middle of a head that shows some of its face
 NEAR = 0.5  # head widths: so near it is the same head
+ON_HAND = 0.6  # head widths of a person: what is so near to the middle of a hand is that hand
 WALKING = 9.0  # head widths a second
 
 
@@ -57,7 +58,7 @@ class Candidate:
     sum_of_odds: float = 0.0  # of all looks after the first
     alive: bool = False  # it moved or swayed, or a face was seen from the front
     disturbed_ns: int = -(10**18)  # when its motion said nothing last
-    lit_ns: int = -(10**18)  # when the light changed last
+    doubted_ns: int = -(10**18)  # when the light changed last, or somebody's hand was there: also a sway says nothing then
     shows_skin: bool = False  # in some look
     glimpse: Glimpse | None = None  # how the place was seen first
 
@@ -133,8 +134,8 @@ class HeadSearch:
     def disturb(self, persons: list[Person], unstable: bool, step: Step) -> None:
         """Note where motion says nothing in this frame: about people who are known, and everywhere while the light changes."""
         for candidate in self.candidates:
-            if unstable:
-                candidate.lit_ns = step.now_ns
+            if unstable or any(_is_hand_of(person, candidate, self._config.hand_odds) for person in persons):
+                candidate.doubted_ns = step.now_ns
             if unstable or any(person.distance(candidate.x, candidate.y) < ABOUT for person in persons):
                 candidate.disturbed_ns = step.now_ns
 
@@ -169,13 +170,20 @@ class HeadSearch:
         candidate.shows_skin |= skin_share(views.skin, candidate.x, candidate.y, candidate.width) >= LEAST_SKIN
 
 
+def _is_hand_of(person: Person, candidate: Candidate, least_odds: float) -> bool:
+    """Whether a candidate is somebody's hand: fists are of the size and colour of heads far away, and sway."""
+    x, y, reach = candidate.x, candidate.y, ON_HAND * person.width
+    tracked = any(math.hypot(hand.motion.x - x, hand.motion.y - y) < reach for hand in person.hands)
+    return tracked or (person.around is not None and person.around.odds_near(HAND, x, y, reach) >= least_odds)
+
+
 def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
     """Whether it sways as people do who stand still.
 
     Near known people, who may pass before it, it must surely be a head, too; and what shows no skin must sway clearly.
     """
     is_person = candidate.is_sure and candidate.shows_skin
-    if step.now_ns - (candidate.lit_ns if is_person else candidate.disturbed_ns) < DISTURBED_S * 1e9:
+    if step.now_ns - (candidate.doubted_ns if is_person else candidate.disturbed_ns) < DISTURBED_S * 1e9:
         candidate.glimpse = None
         return False
     if candidate.glimpse is None:
