@@ -148,6 +148,14 @@ def test_the_end_of_a_raised_arm_that_looks_like_no_hand_is_its_elbow(person):
     assert hand.blob.centroid[1] < 190
 
 
+@pytest.mark.parametrize(("frames", "leaves"), [(2, False), (6, True)])
+def test_a_hand_leaves_the_end_of_its_arm_when_the_finder_sees_it_elsewhere_for_a_tenth_of_a_second(person, frames, leaves):
+    person.hands = [hand_at(1, "right_hand", 280, 240)]
+    arm = Blob(np.ones((125, 30), np.uint8), 280, 150, 3750, 1.0, 0.9)
+    (hand,) = found_on(person, arm, {(295, 250): 0.8, (295, 208): 1.9}, frames)
+    assert (hand.blob.centroid[1] < 225) is leaves
+
+
 def test_what_the_finder_rules_out_begins_no_track(person):
     person.hands = []
     blob = Blob(np.ones((30, 30), np.uint8), 280, 240, 900, 1.0, 0.9)

@@ -32,6 +32,7 @@ ODDS_NEAR = 0.35  # head widths: the finder's middle of a hand is so near the bl
 SURELY, LIKELIER = 0.4, 1.0
 MOST_AREA, HOLES = 1.6, 0.2  # head widths squared, and head widths: of a hand, and holes in its mask that are filled
 ELSEWHERE, FAR_ELSEWHERE = 0.3, 2.2  # head widths from the end of the blob
+ELSEWHERE_S, ELSEWHERE_GAP_S = 0.1, 0.15  # so long a place is seen before a hand goes there: two looks of the finder
 UNLIKELY_S = 0.2  # what the finder takes for no hand for so long is none, whatever its colour; blurred ones it misses a while
 EDGE_PX = 2  # a hand so near the picture's edge is cut by it
 
@@ -151,8 +152,19 @@ class HandTracks:
         place = min(places, key=lambda at: math.dist(at, expected))
         if not (0 if kept else ELSEWHERE) * width <= math.dist(place, hand.centroid) < FAR_ELSEWHERE * width:
             return hand, False
+        if track is not None and not kept and not self._stays_elsewhere(person, track, hand, now_ns):
+            return hand, False
         cut = hand_about(blob.mask, blob.x0, blob.y0, place, REACH * width, hand)
         return (hand, False) if cut is None else (cut, True)
+
+    def _stays_elsewhere(self, person: Person, track: HandTrack, hand: Hand, now_ns: int) -> bool:
+        """Whether a hand that goes on where it just was has been seen elsewhere for a while: one look may be at an elbow."""
+        if math.dist(hand.centroid, track.last_seen) >= ODDS_NEAR * person.width:
+            return True
+        if now_ns - track.elsewhere_ns > ELSEWHERE_GAP_S * 1e9:
+            track.elsewhere_since_ns = now_ns
+        track.elsewhere_ns = now_ns
+        return now_ns - track.elsewhere_since_ns >= ELSEWHERE_S * 1e9
 
     def _observe(self, person: Person, track: HandTrack, blob: Blob, step: Step) -> bool:
         side = {"left_hand": 1.0, "right_hand": -1.0, "unknown": track.motion.x - person.x}[track.kind]

@@ -178,9 +178,9 @@ def _is_hand_of(person: Person, candidate: Candidate, least_odds: float) -> bool
 
 
 def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
-    """Whether it sways as people do who stand still.
+    """Whether it sways as people do who stand still: clearly, or slightly where it surely is a head and shows skin.
 
-    Near known people, who may pass before it, it must surely be a head, too; and what shows no skin must sway clearly.
+    Near known people, who may pass before it, only of such a one the sway says anything.
     """
     is_person = candidate.is_sure and candidate.shows_skin
     if step.now_ns - (candidate.doubted_ns if is_person else candidate.disturbed_ns) < DISTURBED_S * 1e9:
@@ -189,7 +189,7 @@ def _sways(candidate: Candidate, views: Views, step: Step) -> bool:
     if candidate.glimpse is None:
         candidate.glimpse = Glimpse.of(views.full, candidate.x, candidate.y, candidate.width, step.now_ns)
         return False
-    return candidate.glimpse.sways(views.full, step.now_ns, SLIGHT if candidate.shows_skin else CLEAR)
+    return candidate.glimpse.sways(views.full, step.now_ns, SLIGHT if is_person else CLEAR)
 
 
 def worth(odds: float) -> float:

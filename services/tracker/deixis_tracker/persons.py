@@ -49,6 +49,8 @@ class HandTrack:
     evidence: float = 0.0
     watched_s: float = 0.0  # time in which it was seen
     as_seen_ns: int = -(10**18)  # when the hand was cut out last where the finder saw it
+    elsewhere_ns: int = -(10**18)  # when the finder saw it last in another place than it was cut out, and since when
+    elsewhere_since_ns: int = 0
     likely_ns: int = -(10**18)  # when the finder took it last for what may be a hand
     on_arm: bool = False  # the hand was cut from a longer blob when it was seen last
     _middle: tuple[Points | None, tuple[float, float]] = field(default=(None, (0.0, 0.0)), repr=False, compare=False)
